@@ -28,7 +28,7 @@ from scipy.special import ndtr
 
 from estimators.runner import Runner
 from estimators.tracking.area_belief import AreaBelief
-from estimators.tracking.camera_likelihood import FrameLikelihood
+from estimators.tracking.camera_likelihood import FrameLikelihood, image_spread
 from estimators.tracking.camera_sight import CameraSight, DetectionRate, PoseErrors, SightModel
 from estimators.tracking.grid import GridLayout
 from estimators.tracking.search_grid import Scale, SearchGrid
@@ -94,11 +94,12 @@ def by_numpy(sight: CameraSight, north: Array, east: Array) -> Array:
         )
     if not len(sight.detections):
         return np.asarray(1.0 - seen)
-    aa, ab, bb = spread[0, 0] + noise, spread[0, 1], spread[1, 1] + noise
+    (found,) = sight.detections.tolist()
+    (aa, ab), (_, bb) = (image_spread((found[0], found[1]), sight, MODEL) + noise * np.eye(2)).tolist()
     determinant = aa * bb - ab * ab
     da, db = sight.detections[0, 0] - a, sight.detections[0, 1] - b
     distance = (da * da * bb - 2.0 * da * db * ab + db * db * aa) / determinant
-    density = np.exp(-0.5 * distance) / (math.tau * np.sqrt(determinant))
+    density = np.exp(-0.5 * distance) / (math.tau * math.sqrt(determinant))
     area = WIDTH_PX * HEIGHT_PX / FOCAL_PX**2
     return np.asarray(1.0 - seen + seen * density * area / MODEL.false_rate)
 

@@ -14,6 +14,7 @@ from autopilot_bridge.mavlink.wire_units import degrees, e7
 from flightsim.foundation.vectors import Quaternion, Vector
 
 __all__ = [
+    "MOST_IMAGE",
     "SEARCH_LIKELIHOOD",
     "SEARCH_LIKELIHOOD_PAYLOAD",
     "SearchLikelihood",
@@ -21,16 +22,18 @@ __all__ = [
     "search_likelihood_message",
 ]
 
-SEARCH_LIKELIHOOD_PAYLOAD: Final = 0xF518
+SEARCH_LIKELIHOOD_PAYLOAD: Final = 0xF51F
 
-_MOST_WEIGHT: Final = 65_000.0  # of a half-precision number
+_MOST_ROOT: Final = 65_000.0  # of half-precision numbers
 _MOST_M2: Final = 1e8
 _MOST_RAD2: Final = 10.0
-_MOST_IMAGE: Final = 10.0  # image coordinates and distortion
+MOST_IMAGE: Final = 10.0
+"""Bound of image coordinates and distortion."""
 _UNIT_NEAR: Final = 1e-3
 _ROUNDING: Final = 1e-5  # of products of single-precision numbers
 
 Pair = tuple[float, float]
+Root = tuple[float, float, float]
 
 
 def _angle(text: str, most_deg: float) -> Wire:
@@ -61,19 +64,20 @@ _PLACE: Final = Wire(
 _ROTATION: Final = Wire(
     "6f", "covariance of the rotation about the camera's axes: xx, xy, xz, yy, yz, zz, rad^2", most=_MOST_RAD2
 )
-_WEIGHTS: Final = Wire(
-    "2e",
-    "factors of the two covariances in the likelihood of a detection's place, from 1",
-    least=1.0,
-    send=lambda weights: tuple(min(weight, _MOST_WEIGHT) for weight in weights),
+_ROOTS: Final = Wire(
+    "6e",
+    "of each detection the lower triangle L (11, 21, 22) of its information L L' about the target's image "
+    "coordinates",
+    send=lambda roots: [min(max(number, -_MOST_ROOT), _MOST_ROOT) for root in roots for number in root],
+    receive=lambda numbers: (numbers[:3], numbers[3:]),
 )
-_DISTORTION: Final = Wire("5f", "k1, k2, p1, p2, k3 of Brown's model", least=-_MOST_IMAGE, most=_MOST_IMAGE)
+_DISTORTION: Final = Wire("5e", "k1, k2, p1, p2, k3 of Brown's model", least=-MOST_IMAGE, most=MOST_IMAGE)
 _DETECTION: Final = Wire(
     "2f",
-    "image coordinates of detection i, without distortion: right and down over forward",
+    "image coordinates that detection i stands for, without distortion: right and down over forward",
     name="a, b",
-    least=-_MOST_IMAGE,
-    most=_MOST_IMAGE,
+    least=-MOST_IMAGE,
+    most=MOST_IMAGE,
 )
 
 
@@ -90,11 +94,11 @@ class SearchLikelihood:
     q_ned_from_mount: Annotated[Quaternion, _ATTITUDE]
     place_m2: Annotated[tuple[float, float, float, float], _PLACE]
     rotation_rad2: Annotated[tuple[float, float, float, float, float, float], _ROTATION]
-    weights: Annotated[Pair, _WEIGHTS]
     width_px: Annotated[int, Wire("H", "of the picture, pixels", least=1)]
     height_px: Annotated[int, Wire("H", "of the picture, pixels", least=1)]
     focal_px: Annotated[float, Wire("f", "pixels", name="focal length", above=0.0)]
     distortion: Annotated[tuple[float, ...], _DISTORTION]
+    roots: Annotated[tuple[Root, Root], _ROOTS]
     detections: Annotated[
         tuple[Pair, ...], Many(_DETECTION, "detections of the target in the frame: 0, 1 or 2", capacity=2)
     ]
@@ -112,6 +116,7 @@ def _possible(m: SearchLikelihood) -> bool:
         and _covariance(xx, xz, zz)
         and _covariance(yy, yz, zz)
         and determinant >= -_ROUNDING * xx * yy * zz
+        and all(first >= 0.0 and last >= 0.0 for first, _, last in m.roots)
     )
 
 

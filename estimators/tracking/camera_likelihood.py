@@ -3,12 +3,12 @@
 Source: Tisdale et al. 2008, equations 3 to 7, corrected (docs/vision_search.md). The probability of a
 detection at the image coordinates z, given the place x of the target, is
 
-    p(D, z | x) = N(z; U(x), S(x)) p(D, V | x) + P_false (1 - p(D, V | x)) / A
+    p(D, z | x) = N(z; U(x), S) p(D, V | x) + P_false (1 - p(D, V | x)) / A
 
-with the projection U, its covariance S by first-order propagation of the errors of pose and detector, and the
-image area A. Kernels return it relative to what a target far away would give: P_false / A with a detection
-and 1 - P_false without. So a frame changes a belief only where its camera looks, and the likelihood without a
-detection is 1 - p(D, V | x).
+with the projection U, the image area A, and the covariance S of the detection: by first-order propagation of
+the errors of pose and detector at z, or by its root (`Detection`). Kernels return it relative to what a
+target far away would give: P_false / A with a detection and 1 - P_false without. So a frame changes a belief
+only where its camera looks, and the likelihood without a detection is 1 - p(D, V | x).
 """
 
 import math
@@ -19,7 +19,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.tracking.camera_sight import CameraSight, SightModel
+from estimators.tracking.camera_sight import CameraSight, Detection, SightModel
 from estimators.tracking.frame_kernels import (
     BORDER,
     BROWN,
@@ -40,14 +40,11 @@ from estimators.tracking.frame_kernels import (
     NORTH,
     PEAK,
     PLACE,
-    PLACE_WEIGHT,
     QUADRATIC,
     ROTATION,
     SIZE,
     TARGET_PX,
     TURN,
-    TURN_WEIGHT,
-    detection_spread,
     likelihoods,
     of_place,
     of_turn,
@@ -61,6 +58,7 @@ Box = tuple[float, float, float, float]
 
 _UPPER: Final = np.triu_indices(3)
 _FOLD_STEP: Final = 1.02
+_WIDEST: Final = 10.0  # image coordinate of a border; a distortion without an inverse has no bound
 _FARTHEST: Final = 3.0  # image radius up to which the distortion is examined
 _LEAST_RATE: Final = 1e-4
 
@@ -98,16 +96,21 @@ def _detected_places(s: Array, detections: Array, out: Array) -> int:
     """Gaussians on the ground of the detections; returns the number of those that lie on it.
 
     Args:
-        s, detections: of the frame.
+        s: numbers of the frame.
+        detections: (m, 6), as in `Detection`, and the density at its place.
         out: (m, 5), gets north, east, and the covariance nn, ne, ee of each.
     """
     k, found = ROTATION, 0
-    for a, b in detections:
+    for a, b, first, cross, last, _ in detections:
+        if not first * last > 0.0:
+            continue
         down = s[k + 2] + a * s[k + 5] + b * s[k + 8]
         if not down > LEAST_DEPTH:
             continue
         depth = s[HEIGHT] / down
-        aa, ab, bb = detection_spread(of_place(a, b, 1.0 / depth, s), of_turn(a, b, s), s)
+        bb = 1.0 / (last * last)  # the inverse of the information
+        ab = -cross / first * bb
+        aa = (1.0 + (cross / last) ** 2) / (first * first)
         out[found, 0] = s[NORTH] + depth * (s[k] + a * s[k + 3] + b * s[k + 6])
         out[found, 1] = s[EAST] + depth * (s[k + 1] + a * s[k + 4] + b * s[k + 7])
         out[found, 2:] = _on_ground(a, b, aa, ab, bb, s)
@@ -121,7 +124,7 @@ class FrameLikelihood:
 
     Attributes:
         numbers: what the kernels read of the frame and of the team's model.
-        detections: (m, 2) image coordinates.
+        detections: (m, 6), as in `Detection`, and the density at its place.
         box: south, west, north, east; outside the relative likelihood is 1. None: it is 1 everywhere.
     """
 
@@ -142,7 +145,7 @@ class FrameLikelihood:
         box = None
         if sight.height_m > 0.0:
             box = _box(sight, model, s, reach_m)
-        return cls(numbers=s, detections=np.ascontiguousarray(sight.detections, float), box=box)
+        return cls(numbers=s, detections=_gaussians(sight, model), box=box)
 
     def at(self, north_m: Array, east_m: Array) -> Array:
         """Relative likelihoods at places (n,)."""
@@ -165,7 +168,6 @@ def _numbers(sight: CameraSight, model: SightModel) -> Array:
     s[ROTATION : ROTATION + 9] = rotation.ravel()
     s[PLACE : PLACE + 6] = (rotation @ sight.place_m2 @ rotation.T)[_UPPER]
     s[TURN : TURN + 6] = sight.rotation_rad2[_UPPER]
-    s[PLACE_WEIGHT], s[TURN_WEIGHT] = sight.weights
     s[FOCAL] = sight.focal_px
     s[HALF_WIDTH], s[HALF_HEIGHT] = 0.5 * sight.width_px, 0.5 * sight.height_px
     s[BROWN : BROWN + 5] = sight.distortion
@@ -195,6 +197,19 @@ def ground_spread(ray: tuple[float, float], sight: CameraSight, model: SightMode
     (aa, ab), (_, bb) = image_spread(ray, sight, model).tolist()
     nn, ne, ee = _on_ground(*ray, aa, ab, bb, _numbers(sight, model))
     return np.array([[nn, ne], [ne, ee]])
+
+
+def _gaussians(sight: CameraSight, model: SightModel) -> Array:
+    """(m, 6) of the detections. The density is that of a detection alone, also where it repeats earlier ones
+    and its root is small: so much more probable is it than a false one.
+    """
+    noise = (model.pixel_sigma_px / sight.focal_px) ** 2 * np.eye(2)
+    rows = []
+    for k, (a, b) in enumerate(sight.detections.tolist()):
+        alone = Detection.of_covariance((a, b), image_spread((a, b), sight, model) + noise)
+        root = alone[2:] if sight.roots is None else sight.roots[k].tolist()
+        rows.append([a, b, *root, alone.first * alone.last / math.tau])
+    return np.array(rows, dtype=np.float64).reshape(-1, 6)
 
 
 def _box(sight: CameraSight, model: SightModel, s: Array, reach_m: float) -> Box:
@@ -265,7 +280,7 @@ def _border_of(
         tangential = np.column_stack(
             (2.0 * p1 * a * b + p2 * (q + 2.0 * a * a), p1 * (q + 2.0 * b * b) + 2.0 * p2 * a * b)
         )
-        rays = (seen - tangential) / radial[:, None]
+        rays = np.clip((seen - tangential) / radial[:, None], -_WIDEST, _WIDEST)
     low, high = rays.min(axis=0), rays.max(axis=0)
     q = np.linspace(0.0, float((rays**2).sum(axis=1).max()), 16)
     slope = float(np.clip((1.0 + q * (3.0 * k1 + q * (5.0 * k2 + q * 7.0 * k3))).min(), 0.2, 1.0))

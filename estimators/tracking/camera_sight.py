@@ -10,7 +10,7 @@ picture, z down. Image coordinates are those of the ray, a = y / x and b = z / x
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,12 +18,46 @@ from numpy.typing import NDArray
 from estimators.errors import EstimatorError
 from flightsim.foundation.vectors import Quaternion, Vector, conjugate, euler_of, rotate
 
-__all__ = ["CameraSight", "DetectionRate", "PoseErrors", "SightModel", "rotation_matrix"]
+__all__ = [
+    "CameraSight",
+    "Detection",
+    "DetectionRate",
+    "PoseErrors",
+    "SightModel",
+    "lower_root",
+    "rotation_matrix",
+]
 
 Array = NDArray[np.float64]
 
 MAX_DETECTIONS: Final = 2
 """Detections of the target in one frame that a likelihood counts; of one target at most one is true."""
+
+_LEAST_DOWN: Final = 1e-3  # of a ray that meets the ground
+
+
+class Detection(NamedTuple):
+    """The Gaussian of the target's image coordinates by a detection. Its information is L L', with the lower
+    triangle L of `first`, `cross` and `last`.
+    """
+
+    a: float
+    b: float
+    first: float
+    cross: float
+    last: float
+
+    @classmethod
+    def of_covariance(cls, ray: tuple[float, float], covariance: Array) -> "Detection":
+        """The Gaussian of a mean and a covariance (2, 2)."""
+        return cls(*ray, *lower_root(np.linalg.cholesky(np.linalg.inv(covariance))))
+
+
+def lower_root(root: Array) -> tuple[float, float, float]:
+    """11, 21 and 22 of the lower triangle L with L L' = R R', of a root R (2, 2) that may be singular."""
+    lower = np.linalg.qr(root.T)[1].T
+    (first, _), (cross, last) = (lower * np.where(np.diag(lower) < 0.0, -1.0, 1.0)).tolist()
+    return first, cross, last
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -125,14 +159,18 @@ class SightModel:
 class PoseErrors:
     """Standard deviations of a vehicle's own pose, and how long the errors last.
 
-    Errors of successive frames are those of first-order Gauss-Markov processes; of the mount they stay.
-    `DetectionWeights` takes them into account.
+    Errors of successive frames are those of first-order Gauss-Markov processes, but for those that stay: of
+    the mount, of the pictures' times, of the ground, and the bias of the heading. `SharedErrors` takes them
+    into account.
 
     Attributes:
         forward_m, right_m: of the place, along and across the heading.
         height_m: of the height above ground.
         yaw_rad, pitch_rad, roll_rad: of the attitude.
         mount_rad: of the camera's attitude on the vehicle, about each of its axes.
+        yaw_bias_rad: of the part of the yaw's error that stays.
+        latency_s: of the pictures' times.
+        ground_m: of the ground's height.
         place_time_s, attitude_time_s: correlation times of place and height, and of all angles; 0:
             independent frames, as in the paper.
     """
@@ -144,6 +182,9 @@ class PoseErrors:
     pitch_rad: float = 0.005
     roll_rad: float = 0.005
     mount_rad: float = 0.0
+    yaw_bias_rad: float = 0.0
+    latency_s: float = 0.0
+    ground_m: float = 0.0
     place_time_s: float = 0.0
     attitude_time_s: float = 0.0
 
@@ -153,8 +194,17 @@ class PoseErrors:
             if not (math.isfinite(value) and value >= 0.0):
                 raise EstimatorError(f"{name} {value:g} is not possible; give 0 or more")
 
-    def covariances(self, q_ned_from_frd: Quaternion, q_frd_from_mount: Quaternion) -> tuple[Array, Array]:
-        """Covariances of a pose, without weights.
+    def covariances(
+        self,
+        q_ned_from_frd: Quaternion,
+        q_frd_from_mount: Quaternion,
+        velocity_m_s: tuple[float, float] = (0.0, 0.0),
+    ) -> tuple[Array, Array]:
+        """Covariances of one pose by all its errors.
+
+        Args:
+            q_ned_from_frd, q_frd_from_mount: attitude of the vehicle, and of the camera on it.
+            velocity_m_s: of the vehicle, north and east.
 
         Returns:
             (3, 3) of the place, NED, m^2, and (3, 3) of the rotation about the camera's axes, rad^2.
@@ -162,12 +212,15 @@ class PoseErrors:
         roll, _, yaw = euler_of(q_ned_from_frd)
         cosine, sine = math.cos(yaw), math.sin(yaw)
         turn = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
-        place = turn @ np.diag([self.forward_m**2, self.right_m**2, self.height_m**2]) @ turn.T
+        height_m2 = self.height_m**2 + self.ground_m**2
+        place = turn @ np.diag([self.forward_m**2, self.right_m**2, height_m2]) @ turn.T
+        late_m = self.latency_s * np.array(velocity_m_s)
+        place[:2, :2] += np.outer(late_m, late_m)
         to_camera = conjugate(q_frd_from_mount)
         axes = (
             (self.roll_rad, (1.0, 0.0, 0.0)),
             (self.pitch_rad, (0.0, math.cos(roll), -math.sin(roll))),
-            (self.yaw_rad, rotate(conjugate(q_ned_from_frd), (0.0, 0.0, 1.0))),
+            (math.hypot(self.yaw_rad, self.yaw_bias_rad), rotate(conjugate(q_ned_from_frd), (0.0, 0.0, 1.0))),
         )
         rotation = self.mount_rad**2 * np.eye(3)
         for sigma_rad, axis_frd in axes:
@@ -185,12 +238,12 @@ class CameraSight:
         q_ned_from_mount: attitude of the camera's axes.
         place_m2: (3, 3) covariance of the place, NED.
         rotation_rad2: (3, 3) covariance of the rotation about the camera's axes.
-        weights: factors of both variances in the likelihood of a detection's place (`DetectionWeights`);
-            not in that of being in view.
         width_px, height_px: size of the picture; its centre is on the optical axis.
         focal_px: focal length.
         distortion: k1, k2, p1, p2, k3 of Brown's model.
         detections: (m, 2) a and b of the detections of the target; m = 0: none.
+        roots: (m, 3) roots of the detections' information, as in `Detection`; None: those of the pose's
+            covariances, as if no other frame had the same errors.
 
     Raises:
         EstimatorError: a value is not possible.
@@ -200,12 +253,12 @@ class CameraSight:
     q_ned_from_mount: Quaternion
     place_m2: Array
     rotation_rad2: Array
-    weights: tuple[float, float] = (1.0, 1.0)
     width_px: int
     height_px: int
     focal_px: float
     distortion: tuple[float, ...] = (0.0,) * 5
     detections: Array = field(default_factory=lambda: np.zeros((0, 2)))
+    roots: Array | None = None
 
     def __post_init__(self) -> None:
         numbers = (*self.place_ned_m, *self.q_ned_from_mount, self.focal_px, *self.distortion)
@@ -219,6 +272,8 @@ class CameraSight:
             raise EstimatorError(f"distortion {self.distortion} is not k1, k2, p1, p2, k3")
         if self.detections.ndim != 2 or self.detections.shape[1] != 2:
             raise EstimatorError(f"detections have the shape {self.detections.shape}, not (m, 2)")
+        if self.roots is not None and self.roots.shape != (len(self.detections), 3):
+            raise EstimatorError(f"roots have the shape {self.roots.shape}, not (m, 3)")
 
     @property
     def height_m(self) -> float:
@@ -236,7 +291,41 @@ class CameraSight:
         """
         if not variance_m2 > 0.0:
             return self
-        return replace(self, place_m2=self.place_m2 + np.diag([variance_m2, variance_m2, 0.0]))
+        roots = None if self.roots is None else self.roots.copy()
+        for ray, root in zip(self.detections, () if roots is None else roots, strict=False):
+            by_ground = self._image_by_ground(ray)
+            if by_ground is not None:
+                lower = np.array([[root[0], 0.0], [root[1], root[2]]])
+                wide = lower.T @ by_ground
+                rest = np.linalg.inv(np.eye(2) + variance_m2 * wide @ wide.T)
+                root[:] = lower_root(lower @ np.linalg.cholesky(rest))
+        place_m2 = self.place_m2 + np.diag([variance_m2, variance_m2, 0.0])
+        return replace(self, place_m2=place_m2, roots=roots)
+
+    @property
+    def known_m2(self) -> float:
+        """Least variance on the ground of what the frame says: of its detections, or of the pose."""
+        if self.roots is None or not len(self.roots):
+            place, turn = self.place_m2, self.rotation_rad2
+            return float(min(place[0, 0], place[1, 1]) + self.height_m**2 * min(turn[1, 1], turn[2, 2]))
+        most = 0.0
+        for ray, (first, cross, last) in zip(self.detections, self.roots, strict=True):
+            by_ground = self._image_by_ground(ray)
+            if by_ground is not None:
+                upper = np.array([[first, cross], [0.0, last]]) @ by_ground
+                most = max(most, float(np.linalg.norm(upper, 2)) ** 2)
+        return 1.0 / most if most > 0.0 else math.inf
+
+    def _image_by_ground(self, ray: Array) -> Array | None:
+        """(2, 2) derivative of image coordinates by the place on the ground, at a ray; None: it does not meet
+        the ground.
+        """
+        a, b = ray.tolist()
+        r = self.r_mount_from_ned
+        down = float(r.T[2] @ (1.0, a, b))
+        if not (down > _LEAST_DOWN and self.height_m > 0.0):
+            return None
+        return np.asarray((r[1:, :2] - np.outer((a, b), r[0, :2])) * (down / self.height_m))
 
 
 def rotation_matrix(q: Quaternion) -> Array:

@@ -21,24 +21,22 @@ HEIGHT: Final = 2
 ROTATION: Final = 3  # 9 numbers, rows of r_mount_from_ned
 PLACE: Final = 12  # 6 numbers, covariance of the place in camera axes: xx, xy, xz, yy, yz, zz
 TURN: Final = 18  # 6 numbers, covariance of the rotation
-PLACE_WEIGHT: Final = 24
-TURN_WEIGHT: Final = 25
-FOCAL: Final = 26
-HALF_WIDTH: Final = 27
-HALF_HEIGHT: Final = 28
-BROWN: Final = 29  # 5 numbers
-FOLD: Final = 34  # squared radius up to which the distortion is monotonic
-TARGET_PX: Final = 35  # resolution times sqrt(depth^3)
-BORDER: Final = 36
-PEAK: Final = 37
-CONSTANT: Final = 38
-LINEAR: Final = 39
-QUADRATIC: Final = 40
-NOISE: Final = 41  # variance of a detection's place in image coordinates
-DENSITY: Final = 42  # A / P_false
-FAR_U: Final = 43  # pixels; a border farther away does not matter
-FAR_V: Final = 44
-SIZE: Final = 45
+FOCAL: Final = 24
+HALF_WIDTH: Final = 25
+HALF_HEIGHT: Final = 26
+BROWN: Final = 27  # 5 numbers
+FOLD: Final = 32  # squared radius up to which the distortion is monotonic
+TARGET_PX: Final = 33  # resolution times sqrt(depth^3)
+BORDER: Final = 34
+PEAK: Final = 35
+CONSTANT: Final = 36
+LINEAR: Final = 37
+QUADRATIC: Final = 38
+NOISE: Final = 39  # variance of a detection's place in image coordinates
+DENSITY: Final = 40  # A / P_false
+FAR_U: Final = 41  # pixels; a border farther away does not matter
+FAR_V: Final = 42
+SIZE: Final = 43
 
 
 FAR_SIGMAS: Final = 4.5
@@ -52,7 +50,7 @@ _NORMAL: Final = ndtr(
 _GATE: Final = 60.0  # squared distance; beyond it a likelihood is below 1e-13 of its peak
 _MOST: Final = 700.0  # of an exponent
 _BLOCK: Final = 128  # places; what is computed of them stays in the processor's first cache
-_ROWS: Final = 16
+_ROWS: Final = 13
 
 
 @kernel
@@ -85,19 +83,6 @@ def of_turn(a: float, b: float, s: Array) -> tuple[float, float, float]:
     y = r * s[k + 3] - a * s[k + 1] - cross * s[k + 4]
     z = r * s[k + 4] - a * s[k + 2] - cross * s[k + 5]
     return aa, ab, -a * x + r * y - cross * z
-
-
-@kernel
-def detection_spread(
-    place: tuple[float, float, float], turn: tuple[float, float, float], s: Array
-) -> tuple[float, float, float]:
-    """Covariance of the image coordinates of a detection, with the weights of the frame."""
-    p, t = s[PLACE_WEIGHT], s[TURN_WEIGHT]
-    return (
-        p * place[0] + t * turn[0] + s[NOISE],
-        p * place[1] + t * turn[1],
-        p * place[2] + t * turn[2] + s[NOISE],
-    )
 
 
 @kernel
@@ -187,56 +172,48 @@ def _measure(
 
 
 @kernel
-def _smooth(
-    a: Array,
-    b: Array,
-    inverse: Array,
-    s: Array,
-    sigma_u: Array,
-    sigma_v: Array,
-    aa: Array,
-    ab: Array,
-    bb: Array,
-) -> None:
-    """Standard deviations of the pixels of places, and the covariance of a detection's image coordinates."""
+def _smooth(a: Array, b: Array, inverse: Array, s: Array, sigma_u: Array, sigma_v: Array) -> None:
+    """Standard deviations of the pixels of places."""
     focal, noise = s[FOCAL], s[NOISE]
     for i in range(a.size):
         place, turn = of_place(a[i], b[i], inverse[i], s), of_turn(a[i], b[i], s)
-        aa[i], ab[i], bb[i] = detection_spread(place, turn, s)
         sigma_u[i] = focal * np.sqrt(max(0.0, place[0] + turn[0]) + noise)
         sigma_v[i] = focal * np.sqrt(max(0.0, place[2] + turn[2]) + noise)
 
 
 @kernel
-def _density(a: float, b: float, aa: float, ab: float, bb: float, detections: Array) -> float:
-    """Mean density of detections about the image coordinates of a place."""
-    determinant = aa * bb - ab * ab
-    if not determinant > 0.0:  # the rounding of single-precision numbers
-        return 0.0
-    gate = _GATE * determinant
+def _density(a: float, b: float, detections: Array) -> float:
+    """Mean density of detections for a target whose image coordinates are a and b."""
     density = 0.0
     for k in range(detections.shape[0]):
-        da, db = detections[k, 0] - a, detections[k, 1] - b
-        distance = da * da * bb - 2.0 * da * db * ab + db * db * aa
-        if distance < gate:
-            density += math.exp(-0.5 * distance / determinant)
-    if density > 0.0:
-        density /= detections.shape[0] * math.tau * math.sqrt(determinant)
-    return density
+        first, cross, last = detections[k, 2], detections[k, 3], detections[k, 4]
+        da, db = a - detections[k, 0], b - detections[k, 1]
+        one, other = first * da + cross * db, last * db
+        distance = one * one + other * other
+        if distance < _GATE:
+            density += detections[k, 5] * math.exp(-0.5 * distance)
+    return density / detections.shape[0]
 
 
 @kernel
-def _needs_smoothing(depth: Array, outside: Array, inside: Array, least_depth: float, detected: bool) -> bool:
+def _needs_smoothing(depth: Array, outside: Array, inside: Array, least_depth: float) -> bool:
     """Whether there are places whose likelihood depends on the errors of the pose."""
     for i in range(depth.size):
-        if depth[i] > least_depth and not outside[i] > 0.0 and (detected or not inside[i] > 0.0):
+        if depth[i] > least_depth and not outside[i] > 0.0 and not inside[i] > 0.0:
             return True
     return False
 
 
 @kernel
 def likelihoods(north: Array, east: Array, s: Array, detections: Array, out: Array) -> None:
-    """Likelihoods (n,) of a frame for a target at places (n,), relative to one far away."""
+    """Likelihoods (n,) of a frame for a target at places (n,), relative to one far away.
+
+    Args:
+        north, east: (n,) places.
+        s: numbers of the frame and of the team's model.
+        detections: (m, 6) rows of `camera_sight.Detection`, and the density at its place.
+        out: (n,), gets the likelihoods.
+    """
     least_depth, peak, detected = LEAST_DEPTH * s[HEIGHT], s[PEAK], detections.shape[0] > 0
     rows = np.empty((_ROWS, _BLOCK))
     for first in range(0, north.size, _BLOCK):
@@ -246,11 +223,10 @@ def likelihoods(north: Array, east: Array, s: Array, detections: Array, out: Arr
         u, v, half_u, half_v = rows[4, :count], rows[5, :count], rows[6, :count], rows[7, :count]
         inside, outside, exponent = rows[8, :count], rows[9, :count], rows[10, :count]
         sigma_u, sigma_v = rows[11, :count], rows[12, :count]
-        aa, ab, bb = rows[13, :count], rows[14, :count], rows[15, :count]
         _project(north[part], east[part], s, depth, inverse, a, b, u, v)
         _measure(inverse, u, v, s, half_u, half_v, inside, outside, exponent)
-        if _needs_smoothing(depth, outside, inside, least_depth, detected):
-            _smooth(a, b, inverse, s, sigma_u, sigma_v, aa, ab, bb)
+        if _needs_smoothing(depth, outside, inside, least_depth):
+            _smooth(a, b, inverse, s, sigma_u, sigma_v)
         for i in range(count):
             if not depth[i] > least_depth or outside[i] > 0.0 or half_u[i] <= 0.0 or half_v[i] <= 0.0:
                 out[first + i] = 1.0
@@ -261,5 +237,4 @@ def likelihoods(north: Array, east: Array, s: Array, detections: Array, out: Arr
             seen /= 1.0 + math.exp(exponent[i])
             out[first + i] = 1.0 - seen
             if detected:
-                density = _density(a[i], b[i], aa[i], ab[i], bb[i], detections)
-                out[first + i] += seen * density * s[DENSITY]
+                out[first + i] += seen * _density(a[i], b[i], detections) * s[DENSITY]

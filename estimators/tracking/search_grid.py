@@ -117,9 +117,7 @@ class SearchGrid:
         reach_m = (layout.rows + layout.columns) * layout.cell_m + math.dist(
             sight.place_ned_m[:2], (layout.south_m, layout.west_m)
         )
-        known_m2 = min(sight.place_m2[0, 0], sight.place_m2[1, 1])
-        known_m2 += sight.height_m**2 * min(sight.rotation_rad2[1, 1], sight.rotation_rad2[2, 2])
-        blur_m2 = self._within_m2 - float(known_m2)
+        blur_m2 = self._within_m2 - sight.known_m2
         self._coarse = self._coarse or (blur_m2 > 0.0 and len(sight.detections) > 0)
         frame = FrameLikelihood.of(sight.blurred(blur_m2), self.model, reach_m)
         box = frame.box

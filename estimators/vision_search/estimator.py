@@ -221,7 +221,14 @@ class VisionSearchEstimator(Estimator[VisionSearchParameters]):
             camera.counts["repeated"] += 1
             return Outcome.REPEATED
         likelihood = likelihood_of(
-            camera, scan, detections, self._errors, frame, tag_id=p.tag_id, pixel_sigma_px=p.pixel_sigma_px
+            camera,
+            scan,
+            detections,
+            self._errors,
+            frame,
+            tag_id=p.tag_id,
+            pixel_sigma_px=p.pixel_sigma_px,
+            walk_m_sqrt_s=p.walk_m_sqrt_s,
         )
         if likelihood is None:
             camera.counts["without_pose"] += 1

@@ -4,23 +4,25 @@ numbers.
 
 import math
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
 
 from autopilot_bridge.mavlink.camera_scan import CameraScan
-from autopilot_bridge.mavlink.search_likelihood import SearchLikelihood
+from autopilot_bridge.mavlink.search_likelihood import MOST_IMAGE, SearchLikelihood
 from estimators import wire
-from estimators.tracking.camera_sight import MAX_DETECTIONS, CameraSight, PoseErrors
-from estimators.tracking.detection_weights import DetectionWeights
-from estimators.vision.vehicle_track import VehicleTrack
+from estimators.tracking.camera_sight import MAX_DETECTIONS, CameraSight, Detection, PoseErrors
+from estimators.tracking.shared_errors import SharedErrors, View
+from estimators.vision.vehicle_track import VehiclePose, VehicleTrack, ground_place
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
-from flightsim.foundation.vectors import from_euler, product, rotate
+from flightsim.foundation.vectors import Vector, from_euler, product, rotate
 
 __all__ = ["Camera", "likelihood_of", "sight_of"]
 
 _KEPT: Final = 8  # exposures with detections whose frame has not ended
+_STEP_US: Final = 500_000  # over which velocities are taken
 _REMEMBERED: Final = 20_000  # frames by number
 
 
@@ -35,7 +37,7 @@ class Camera:
         offset_us: from its vehicle time to the time common to all.
         counts: frames by what became of them.
         last_used_us: exposure of the last frame that was used.
-        weights: of its detections; None: there was none yet.
+        shared: the errors of its detections; None: there was none yet.
         component: of the camera: the first one that has ended a frame.
     """
 
@@ -46,7 +48,7 @@ class Camera:
     offset_us: int = 0
     counts: Counter[str] = field(default_factory=Counter)
     last_used_us: int | None = None
-    weights: DetectionWeights | None = None
+    shared: SharedErrors | None = None
     component: int | None = None
     _pending: dict[tuple[int, int], list[tuple[float, float]]] = field(default_factory=dict)
     _counted: dict[tuple[int, int], int] = field(default_factory=dict)
@@ -114,6 +116,7 @@ def likelihood_of(
     *,
     tag_id: int,
     pixel_sigma_px: float,
+    walk_m_sqrt_s: float,
 ) -> SearchLikelihood | None:
     """The parameters of a frame's likelihood; None: no pose near its time is known, or the camera is on a
     gimbal.
@@ -122,21 +125,25 @@ def likelihood_of(
     if pose is None or scan.mount_rad is None:
         return None
     q_frd_from_mount = from_euler(*scan.mount_rad)
-    arm = rotate(pose.q_ned_from_frd, scan.position_frd_m)
-    north_m, east_m, down_m = (p + a for p, a in zip(pose.pos_ned_m, arm, strict=True))
+    north_m, east_m, down_m = _camera_place(pose, scan)
+    before = camera.track.at(scan.time_us - _STEP_US)
     lat_deg, lon_deg, _ = frame.geodetic_from_ned(north_m, east_m, 0.0)
-    place, rotation = errors.covariances(pose.q_ned_from_frd, q_frd_from_mount)
-    weight = 1.0
-    if detections:
-        if camera.weights is None:
-            camera.weights = DetectionWeights(errors, pixel_sigma_px / scan.focal_px)
-        weight = camera.weights.take(
-            scan.time_us,
+    velocity_m_s = (0.0, 0.0) if before is None else _rate(pose.pos_ned_m, before.pos_ned_m)
+    place, rotation = errors.covariances(pose.q_ned_from_frd, q_frd_from_mount, velocity_m_s)
+    found: list[Detection] = []
+    for ray in detections:
+        if camera.shared is None:
+            camera.shared = SharedErrors(errors, pixel_sigma_px / scan.focal_px, walk_m_sqrt_s=walk_m_sqrt_s)
+        view = View(
+            time_us=scan.time_us,
+            place_ne_m=(north_m, east_m),
             height_m=-down_m,
             q_ned_from_frd=pose.q_ned_from_frd,
             q_frd_from_mount=q_frd_from_mount,
-            ray=detections[0],
+            ray=ray,
+            rate_m_s=_rate_on_ground(pose, before, scan, ray),
         )
+        found.append(camera.shared.take(view))
     return SearchLikelihood(
         tag_id=tag_id,
         number=scan.number,
@@ -147,13 +154,44 @@ def likelihood_of(
         q_ned_from_mount=product(pose.q_ned_from_frd, q_frd_from_mount),
         place_m2=(place[0, 0], place[0, 1], place[1, 1], place[2, 2]),
         rotation_rad2=(*rotation[0], rotation[1, 1], rotation[1, 2], rotation[2, 2]),
-        weights=(weight, weight),
         width_px=scan.width_px,
         height_px=scan.height_px,
         focal_px=scan.focal_px,
         distortion=scan.distortion,
-        detections=detections,
+        roots=(_root_of(found, 0), _root_of(found, 1)),
+        detections=tuple((_in_picture(item.a), _in_picture(item.b)) for item in found),
     )
+
+
+def _root_of(found: Sequence[Detection], index: int) -> tuple[float, float, float]:
+    """Zeros: there is no such detection."""
+    return found[index][2:] if index < len(found) else (0.0, 0.0, 0.0)
+
+
+def _camera_place(pose: VehiclePose, scan: CameraScan) -> Vector:
+    arm = rotate(pose.q_ned_from_frd, scan.position_frd_m)
+    n, e, d = (p + a for p, a in zip(pose.pos_ned_m, arm, strict=True))
+    return n, e, d
+
+
+def _rate(now: Sequence[float], before: Sequence[float]) -> tuple[float, float]:
+    """Velocity, north and east, between two places."""
+    step_s = 1e-6 * _STEP_US
+    return (now[0] - before[0]) / step_s, (now[1] - before[1]) / step_s
+
+
+def _rate_on_ground(
+    pose: VehiclePose, before: VehiclePose | None, scan: CameraScan, ray: tuple[float, float]
+) -> tuple[float, float]:
+    """Velocity at which the vehicle moves a ray over the ground; zeros: it is not known."""
+    angles = math.atan(ray[0]), math.atan(ray[1])
+    now = ground_place(pose, scan, *angles)
+    then = None if before is None else ground_place(before, scan, *angles)
+    return (0.0, 0.0) if now is None or then is None else _rate(now, then)
+
+
+def _in_picture(coordinate: float) -> float:
+    return min(max(coordinate, -MOST_IMAGE), MOST_IMAGE)
 
 
 def sight_of(likelihood: SearchLikelihood, frame: LocalFrame) -> CameraSight:
@@ -167,10 +205,10 @@ def sight_of(likelihood: SearchLikelihood, frame: LocalFrame) -> CameraSight:
         q_ned_from_mount=m.q_ned_from_mount,
         place_m2=np.array([[nn, ne, 0.0], [ne, ee, 0.0], [0.0, 0.0, dd]]),
         rotation_rad2=np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]),
-        weights=m.weights,
         width_px=m.width_px,
         height_px=m.height_px,
         focal_px=m.focal_px,
         distortion=m.distortion,
         detections=np.array(m.detections, dtype=np.float64).reshape(-1, 2),
+        roots=np.array(m.roots[: len(m.detections)], dtype=np.float64).reshape(-1, 3),
     )

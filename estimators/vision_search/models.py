@@ -51,6 +51,9 @@ def pose_errors_of(parameters: VisionSearchParameters) -> PoseErrors:
         pitch_rad=parameters.pitch_sigma_rad,
         roll_rad=parameters.roll_sigma_rad,
         mount_rad=parameters.mount_sigma_rad,
+        yaw_bias_rad=parameters.yaw_bias_sigma_rad,
+        latency_s=parameters.latency_sigma_s,
+        ground_m=parameters.ground_sigma_m,
         place_time_s=parameters.place_time_s,
         attitude_time_s=parameters.attitude_time_s,
     )

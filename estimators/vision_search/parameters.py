@@ -86,7 +86,16 @@ class VisionSearchParameters(Options):
         math.radians(0.23), least=0.0, help="Standard deviation of the vehicles' roll."
     )
     mount_sigma_rad: float = option(
-        math.radians(0.29), least=0.0, help="Standard deviation of the angles of the cameras' mounts."
+        math.radians(1.0), least=0.0, help="Standard deviation of the angles of the cameras' mounts."
+    )
+    yaw_bias_sigma_rad: float = option(
+        math.radians(3.0), least=0.0, help="Standard deviation of the part of the yaw's error that stays."
+    )
+    latency_sigma_s: float = option(
+        0.1, least=0.0, help="Standard deviation of the error of the pictures' times, the same in all frames."
+    )
+    ground_sigma_m: float = option(
+        4.0, least=0.0, help="Standard deviation of the ground's height at the target about that of home."
     )
     place_time_s: float = option(60.0, least=0.0, help="Correlation time of the places' errors.")
     attitude_time_s: float = option(60.0, least=0.0, help="Correlation time of the attitudes' errors.")

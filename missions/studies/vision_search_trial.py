@@ -53,12 +53,11 @@ _ERRORS: Final = VisionSearchParameters(
     yaw_sigma_rad=0.005,
     pitch_sigma_rad=0.0016,
     roll_sigma_rad=0.0016,
-    mount_sigma_rad=math.radians(0.3),
     place_time_s=30.0,
     attitude_time_s=100.0,
 )
-"""Errors that the filter expects: of `pose_errors` in flights with other seeds than the study's, and of the
-cameras' mounts those with which they are drawn.
+"""Errors that the filter expects: of `pose_errors` in flights with other seeds than the study's. Of mounts,
+headings, times and ground it knows no more than the defaults say.
 """
 _PARAMETERS: Final = MappingProxyType(
     {"COM_LOW_BAT_ACT": 0.0}

@@ -18,7 +18,11 @@ HOME = GeodeticPosition(lat_deg=47.4, lon_deg=8.5, alt_m=480.0)
 FRAME = LocalFrame(HOME)
 TAG = (12.0, -20.0)
 FOCAL_PX = 914.0
-FIELDS = {"south_m": -100.0, "west_m": -100.0, "north_m": 100.0, "east_m": 100.0}
+CALIBRATED = {
+    "mount_sigma_rad": math.radians(0.29), "yaw_bias_sigma_rad": 0.0, "latency_sigma_s": 0.0,
+    "ground_sigma_m": 0.0,
+}  # fmt: skip
+FIELDS = {"south_m": -100.0, "west_m": -100.0, "north_m": 100.0, "east_m": 100.0, **CALIBRATED}
 
 
 def parameters(**changes):
@@ -203,7 +207,7 @@ def test_a_likelihood_keeps_its_numbers_and_malformed_ones_are_ignored():
     (message, _) = runner.estimator.publish()
     content = (message.payload_type, message.payload_length, message.payload)
     found = read_search_likelihood(*content)
-    assert found.number == 1 and found.time_us == 1_250_000 and found.weights == (1.0, 1.0)
+    assert found.number == 1 and found.time_us == 1_250_000
     assert found.height_m == 60.0 and found.focal_px == FOCAL_PX
     assert found.detections == ((0.0, 0.0),)
     assert math.hypot(*found.q_ned_from_mount) == pytest.approx(1.0)
@@ -217,7 +221,7 @@ def test_a_likelihood_keeps_its_numbers_and_malformed_ones_are_ignored():
         flight.say(dialect.MAVLink_tunnel_message(0, 0, content[0], 128, broken), 191)
     assert refused > 200
     assert np.all(np.isfinite(runner.estimator.belief.moments()[0]))
-    assert read_search_likelihood(content[0], 127, message.payload) is None
+    assert read_search_likelihood(content[0], 125, message.payload) is None
     assert read_search_likelihood(0, 128, message.payload) is None
 
 
@@ -267,8 +271,8 @@ def test_two_tags_of_the_id_leave_both_places():
     flight = Flight(runner)
     for k in range(6):
         flight.look(12.0, -8.0 + k, tags=((0, TAG), (0, other)))
-    shares = runner.estimator.belief.shares(layout_of(parameters(cell_m=20.0)))  # type: ignore[attr-defined]
-    places = [((np.array(p) + 100.0) / 20.0).astype(int) for p in (TAG, other)]
+    shares = runner.estimator.belief.shares(layout_of(parameters(cell_m=10.0)))  # type: ignore[attr-defined]
+    places = [((np.array(p) + 100.0) / 10.0).astype(int) for p in (TAG, other)]
     assert all(0.2 < shares[row - 1 : row + 2, column - 1 : column + 1].sum() < 0.8 for row, column in places)
 
 
