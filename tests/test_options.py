@@ -13,10 +13,10 @@ from estimators.names import ESTIMATORS
 from flightsim.foundation.options import Declared, Options, declared
 from flightsim.foundation.user_options import user_options
 from missions.cli import options_page
+from missions.cli.declared_options import DeclaredOption, chosen_names
 from missions.cli.fly import fly
-from missions.cli.fly_command import _COMMANDS, chosen_names
+from missions.cli.fly_command import _COMMANDS
 from missions.cli.main import command_line
-from missions.cli.mission_command import DeclaredOption
 from missions.survey.options import CALIBRATION_ALTITUDE_M, SurveyOptions
 
 PAGE = Path(__file__).parents[1] / "docs/options.md"

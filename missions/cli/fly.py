@@ -8,9 +8,9 @@ import click
 
 from estimators.names import ESTIMATORS
 from missions.catalogue import NAMES
+from missions.cli.declared_options import FlightOption, Scope
 from missions.cli.fly_command import FlyCommand, flight_option
 from missions.cli.later import body_in
-from missions.cli.mission_command import FlightOption, Scope
 from missions.cli.options import FIRMWARE_HELP, SECONDS, SPEEDUP, STRICT_HELP, WORLD_HELP, FiniteRange
 from missions.cli.signing import key_option
 

@@ -10,7 +10,8 @@ import click
 
 from flightsim.foundation.plug_ins import plug_ins
 from missions.catalogue import GROUP
-from missions.cli.mission_command import MISSION_GROUP, FlightOption, MissionCommand, Scope
+from missions.cli.declared_options import MISSION_GROUP, FlightOption, Scope, chosen_names
+from missions.cli.mission_command import MissionCommand
 from missions.cli.mission_commands import COMMANDS, FILE, OWN
 from missions.errors import PlanError
 from missions.plan_files.suffixes import SUFFIXES as MISSION_FILES
@@ -114,15 +115,6 @@ def flight_option(
 ) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """Decorator for an option of every flight."""
     return click.option(*declarations, cls=FlightOption, **attributes)
-
-
-def chosen_names(context: click.Context) -> frozenset[str]:
-    """Names of the options that the user specified on the command line."""
-    return frozenset(
-        name
-        for name in context.params
-        if context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE
-    )
 
 
 def refuse_idle_options(context: click.Context, *, connected: bool) -> None:

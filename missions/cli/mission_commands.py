@@ -7,7 +7,8 @@ from typing import Any, Final
 import click
 
 from missions.catalogue import PATTERNS
-from missions.cli.mission_command import Given, MissionCommand, option
+from missions.cli.declared_options import Given
+from missions.cli.mission_command import MissionCommand, option
 from missions.cli.option_classes import MISSION_FILE, OPTIONS, PARTS, PATTERN
 from missions.errors import PlanError
 

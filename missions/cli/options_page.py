@@ -14,7 +14,7 @@ from estimators.library import estimator_class
 from estimators.names import ESTIMATORS
 from flightsim.foundation.options import Declared, declared, unit_of
 from flightsim.foundation.user_options import choices_of, written
-from missions.cli.mission_command import DeclaredOption, Scope
+from missions.cli.declared_options import DeclaredOption, Scope
 from missions.cli.mission_commands import COMMANDS
 from missions.cli.options import in_options
 

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from missions.cli.declared_options import Given
 from missions.cli.later import later
-from missions.cli.mission_command import Given
 from missions.cli.options import FiniteRange
 
 if TYPE_CHECKING:

@@ -7,8 +7,8 @@ from typing import Any, Final, TypeVar
 import click
 
 from missions.base.options import PlanOptions
+from missions.cli.declared_options import FlightOption, Given, declared_options, made
 from missions.cli.later import later
-from missions.cli.mission_command import FlightOption, Given, declared_options, made
 from missions.cli.options import FIRMWARE_HELP
 from missions.cli.study_command import StudyCommand
 from missions.studies.options import (

@@ -14,8 +14,8 @@ from missions.base.report import Report
 from missions.base.request import RunRequest
 from missions.cli.bodies.fly import flight_of
 from missions.cli.bodies.fly_report import Pace, print_result
+from missions.cli.declared_options import FlightOption
 from missions.cli.fly import fly
-from missions.cli.mission_command import FlightOption
 from missions.errors import PlanError
 from missions.flown.run_folder import wind_words
 from missions.library import MISSIONS

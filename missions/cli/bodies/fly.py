@@ -20,7 +20,8 @@ from missions.cli.bodies.fly_report import KILLED, ProgressLine, leave_closed_te
 from missions.cli.bodies.params import known_to_all
 from missions.cli.bodies.signing import key_from, warn_if_open
 from missions.cli.bodies.world import firmware_of, world_of
-from missions.cli.fly_command import chosen_names, refuse_idle_options
+from missions.cli.declared_options import chosen_names
+from missions.cli.fly_command import refuse_idle_options
 from missions.cli.mission_command import MissionCommand
 from missions.cli.options import in_options, report
 from missions.errors import MissionError, PlanError

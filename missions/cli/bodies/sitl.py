@@ -29,7 +29,7 @@ from missions.cli.bodies.status_line import StatusLine, announce_compiling
 from missions.cli.bodies.storage import Losses, VehicleCards
 from missions.cli.bodies.video import start_video
 from missions.cli.bodies.world import equipped, firmware_of, world_of
-from missions.cli.fly_command import chosen_names
+from missions.cli.declared_options import chosen_names
 from missions.cli.options import SLOWEST, in_options, report
 from missions.process.ending import EndRequests
 

@@ -17,7 +17,7 @@ import click
 
 from missions.cli.bodies.status_line import StatusLine
 from missions.cli.bodies.world import firmware_of
-from missions.cli.mission_command import Given
+from missions.cli.declared_options import Given
 from missions.cli.mission_commands import arguments_of
 from missions.cli.options import in_options, report
 from missions.cli.study_command import StudyCommand

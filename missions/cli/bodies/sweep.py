@@ -16,8 +16,8 @@ from missions.base.given_text import parse_wind
 from missions.base.mission import Mission
 from missions.base.request import RunRequest
 from missions.cli.bodies.fly import flight_of
+from missions.cli.declared_options import FlightOption, Given, Scope
 from missions.cli.fly import fly
-from missions.cli.mission_command import FlightOption, Given, Scope
 from missions.library import find_mission
 from missions.runs.limits_before_flight import check_request
 from missions.runs.vehicle_opening import VehicleOpener

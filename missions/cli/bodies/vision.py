@@ -12,7 +12,7 @@ from estimators.handoff.motion_watch import MotionWatchParameters
 from estimators.vision import TagDetectorParameters
 from missions.cli.bodies.signing import key_from, warn_if_open
 from missions.cli.bodies.status_line import StatusLine
-from missions.cli.fly_command import chosen_names
+from missions.cli.declared_options import chosen_names
 from missions.cli.options import in_options, report
 from missions.errors import PlanError
 from missions.estimation.vision import FAILED, INTERRUPTED, VisionProgress, VisionRequest, watch

@@ -14,7 +14,7 @@ from flightsim.wind_profile import WindLaw, WindProfile
 from flightsim.world_spec import VehicleSpec, WorldSpec, launched
 from missions.base.given_text import parse_wind
 from missions.base.mission import WorldDefaults
-from missions.cli.mission_command import Given
+from missions.cli.declared_options import Given
 from missions.worlds.motion_kind import MotionKind
 from missions.worlds.motions import motion_of
 from missions.worlds.payloads import CAMERA, MAGNETOMETER, carrying
