@@ -24,15 +24,16 @@ from estimators.references import (
     targets_reference,
 )
 from estimators.runner import EstimateTable, Runner
+from estimators.user_choices import Against
 from flightsim.foundation.geodesy import GeodeticPosition
 
 if TYPE_CHECKING:
     from estimators.logs import Log
 
 AGAINST: Final[Mapping[str, Sequence[str]]] = {
-    "autopilot": (AUTOPILOT,),
-    "truth": (TRUTH,),
-    "both": (AUTOPILOT, TRUTH),
+    Against.AUTOPILOT: (AUTOPILOT,),
+    Against.TRUTH: (TRUTH,),
+    Against.BOTH: (AUTOPILOT, TRUTH),
 }
 """The references that estimates can be compared with, the main one first."""
 
@@ -85,7 +86,7 @@ class Comparison:
         return errors(column, self.estimates[column], self.references[reference][column])
 
 
-def comparisons(logs: "Sequence[Log]", runner: Runner, against: str = "both") -> list[Comparison]:
+def comparisons(logs: "Sequence[Log]", runner: Runner, against: str = Against.BOTH) -> list[Comparison]:
     """Compare the estimates of a runner with the references in its logs.
 
     Args:

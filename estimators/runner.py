@@ -22,12 +22,12 @@ from estimators.interface import Estimate, EstimateSet, Estimator, Need, Outcome
 from estimators.messages import Message, is_a, read_message
 from estimators.needs import message_names
 from estimators.observations import Observation
+from estimators.user_choices import ESTIMATOR_COMPONENTS
 from estimators.vehicle_time import TeamTime, VehicleTime
 
 ReceivedT = TypeVar("ReceivedT")
 
 TRUTH_MESSAGES: Final = frozenset({"SIMSTATE", "SIM_STATE", "HIL_STATE", "HIL_STATE_QUATERNION"})
-ESTIMATOR_COMPONENTS: Final = frozenset(range(191, 195))
 """Onboard computers. Estimators run there, as do programs that use their own cameras and other sensors."""
 ESTIMATE_MESSAGES: Final = frozenset(
     {

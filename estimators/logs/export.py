@@ -14,8 +14,9 @@ from estimators.logs.new_file import new_file
 from estimators.logs.table import Table
 from estimators.logs.units import to_si
 from estimators.messages import SOURCE_FIELDS
+from estimators.user_choices import ExportFormat
 
-FORMATS: Final = ("csv", "parquet", "npz", "mcap")
+FORMATS: Final = tuple(map(str, ExportFormat))
 """csv, parquet: a folder with a file for each message and component; npz, mcap: one file."""
 
 _TIMES: Final = ("time_us", "log_time_us")

@@ -14,6 +14,7 @@ from estimators.log_replay import log_supplies, missing_of, vehicles_in
 from estimators.logs import Log
 from estimators.needs import Supply
 from estimators.runner import Runner
+from estimators.user_choices import Against
 
 COMPLETED: Final = "completed"
 FAILED: Final = "failed"
@@ -51,7 +52,7 @@ def assess(
     fleet: Fleet,
     logs: Sequence[Log],
     *,
-    against: str = "both",
+    against: str = Against.BOTH,
     failure: str = "",
     interrupted: bool = False,
     supplies: Mapping[int, Sequence[Supply]] | None = None,

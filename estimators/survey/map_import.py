@@ -9,7 +9,6 @@ than WGS84 are transformed by PROJ. The libraries are an extra: `pip install 'fl
 import math
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
@@ -18,15 +17,14 @@ from numpy.typing import NDArray
 
 from estimators.errors import EstimatorError
 from estimators.survey.map_grids import netcdf, raster
+from estimators.survey.map_import_options import MapImport
 from estimators.survey.map_lines import gridded, line_data
 from estimators.survey.map_places import WGS84, ReferenceSystem, grid_degrees, transformed
-from estimators.survey.map_values import Values, checked_values, with_main_field
+from estimators.survey.map_values import checked_values, with_main_field
 from flightsim.foundation.file_content import XZ, FileError, file_head
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame, longitude_near
 from flightsim.foundation.magnetic_map_file import MagneticMapError, MapContents
 from flightsim.foundation.vectors import wrap_180
-
-__all__ = ["MapImport", "imported_map"]
 
 Array = NDArray[np.float64]
 
@@ -51,45 +49,6 @@ _ACCEPTED: Final = (
 _MAX_POINTS: Final = 4_000_000
 _FARTHEST_M: Final = 100_000.0  # of the data from home
 _ON_LINE: Final = 1e-6  # of the spacing: data that end there end on a grid line
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MapImport:
-    """How a file becomes a map.
-
-    Attributes:
-        home: origin of the map's frame; None: the middle of the data, at sea level.
-        height_m: height above home at which the map is valid.
-        spacing_m: distance of its grid lines.
-        values: whether the file has total field, or an anomaly that a main field is to be added to.
-        decimal_year: date of the main field.
-        crs: coordinate reference system of the places ("EPSG:32723"), also in place of the one that the file
-            declares; None: that one, and WGS84 for tables and netCDF grids in degrees without one.
-        column: name of the value's column or variable, number or description of its band; None: the only
-            one that can be it.
-        line_spacing_m: distance of the survey's lines; needed for line data.
-        error_nt: standard deviation that the survey states.
-        no_data: value that stands for no data, where the file does not mark it as such.
-    """
-
-    home: GeodeticPosition | None = None
-    height_m: float = 100.0
-    spacing_m: float = 100.0
-    values: Values = Values.TOTAL
-    decimal_year: float = 2026.0
-    crs: str | None = None
-    column: str | None = None
-    line_spacing_m: float | None = None
-    error_nt: float | None = None
-    no_data: float | None = None
-
-    def __post_init__(self) -> None:
-        for name in ("spacing_m", "line_spacing_m", "error_nt"):
-            value = getattr(self, name)
-            if value is not None and not (math.isfinite(value) and value > 0.0):
-                raise EstimatorError(f"`{name}` {value:g} is not possible; ask for more than 0")
-        if not math.isfinite(self.height_m):
-            raise EstimatorError(f"`height_m` {self.height_m} is not a height; give metres above home")
 
 
 def imported_map(path: Path, how: MapImport) -> MapContents:

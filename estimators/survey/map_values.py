@@ -1,7 +1,6 @@
 """The values of an imported map: total field, or an anomaly and the main field it is added to."""
 
 from collections.abc import Mapping
-from enum import StrEnum
 from pathlib import Path
 from typing import Any, Final
 
@@ -9,12 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimators.errors import EstimatorError
+from estimators.survey.map_import_options import Values
 from flightsim.foundation.geodesy import GeodeticPosition
 from flightsim.foundation.magnetic_map_file import EARTH_NT
 from flightsim.foundation.magnetics import FieldModel
 from flightsim.foundation.main_field import MainField
 
-__all__ = ["LATITUDES", "LONGITUDES", "Values", "checked_values", "chosen", "with_main_field"]
+__all__ = ["LATITUDES", "LONGITUDES", "checked_values", "chosen", "with_main_field"]
 
 Array = NDArray[np.float64]
 
@@ -32,14 +32,6 @@ _NAMES_SHOWN: Final = 20
 _LONGEST_NAME: Final = 40
 _ANOMALY_NT: Final = 10_000.0
 _SINGLE: Final = 1e-6  # of a value that was stored in single precision
-
-
-class Values(StrEnum):
-    """What the values of a file are."""
-
-    TOTAL = "total"
-    ANOMALY_WMM = "anomaly-wmm"
-    ANOMALY_IGRF = "anomaly-igrf"
 
 
 def chosen(path: Path, found: Mapping[str, Any], column: str | None) -> Any:

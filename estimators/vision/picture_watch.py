@@ -24,7 +24,8 @@ from estimators.messages import Message, is_a
 from estimators.vision.camera_file import CameraDescription
 from estimators.vision.clock_check import ClockCheck
 from estimators.vision.foreign_markers import ForeignMarkers
-from estimators.vision.tag_detector import Picture, TagDetection, TagDetector, TagDetectorParameters
+from estimators.vision.tag_detector import Picture, TagDetection, TagDetector
+from estimators.vision.tag_parameters import TagDetectorParameters
 from estimators.vision.vehicle_track import VehicleTrack, ground_place
 from flightsim.foundation.vectors import rotate
 

@@ -13,50 +13,17 @@ import numpy as np
 from apriltag import apriltag
 from numpy.typing import NDArray
 
-from estimators.errors import EstimatorError
 from estimators.vision.camera import CameraGeometry
+from estimators.vision.tag_parameters import TagDetectorParameters
 
 Array = NDArray[np.float64]
 Picture = NDArray[np.uint8]
 
-TAGS: Final = 587
-"""Number of tags in the family."""
 _LEAST_SIDE_PX: Final = 8
 """A tag is eight cells across, so in less none is read; below 3 pixels the library ends the process."""
 _CORNERS: Final = "lb-rb-rt-lt"  # the library's name for the corners and their order
 _FROM_TOP_LEFT: Final = [1, 0, 3, 2]
 """Of those corners, in our order: the printed tag's top is the library's bottom."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TagDetectorParameters:
-    """Parameters of the detector.
-
-    Attributes:
-        size_m: side of the black square.
-        sizes_m: (number, side) of single tags whose side is not `size_m`.
-        tag_ids: the tags that are reported; empty: all of the family.
-        corrected_bits: at most this many wrong bits of a tag are corrected. The family's codes differ in 11
-            bits; each bit that is corrected lets more of what is no tag pass.
-
-    Raises:
-        EstimatorError: a value is not possible.
-    """
-
-    size_m: float = 1.0
-    sizes_m: tuple[tuple[int, float], ...] = ()
-    tag_ids: tuple[int, ...] = ()
-    corrected_bits: int = 1
-
-    def __post_init__(self) -> None:
-        for name, size_m in (("size_m", self.size_m), *(("sizes_m", size_m) for _, size_m in self.sizes_m)):
-            if not (math.isfinite(size_m) and size_m > 0.0):
-                raise EstimatorError(f"{name} {size_m:g} m is not possible; give more than 0")
-        for tag_id in (*self.tag_ids, *(number for number, _ in self.sizes_m)):
-            if not 0 <= tag_id < TAGS:
-                raise EstimatorError(f"tag {tag_id} is not in 0..{TAGS - 1}, the family 36h11")
-        if not 0 <= self.corrected_bits <= 5:
-            raise EstimatorError(f"corrected_bits {self.corrected_bits} is not in 0..5")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -84,6 +84,8 @@ class UserOption:
             return ""
         if choices := choices_of(kind):
             return "|".join(choices)
+        if get_origin(kind) is tuple and get_args(kind)[-1] is Ellipsis:
+            kind = get_args(kind)[0]
         unit = self.declared.unit.replace(" ", "")
         return self.option.metavar or (unit or _KINDS.get(kind, "TEXT")).upper()
 

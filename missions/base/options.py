@@ -39,6 +39,13 @@ class PlanOptions(Options):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class SeedOptions(PlanOptions):
+    """What all that draws random numbers has."""
+
+    seed: int = option(0, least=0, help="Seed of the random numbers: one seed makes one result.")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class MissionOptions(PlanOptions):
     """Options that every mission has, such as the number of vehicles and the altitude. Each mission derives
     its own class.

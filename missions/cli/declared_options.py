@@ -66,12 +66,14 @@ class DeclaredOption(FlightOption):
 
     Args:
         user: the option as users see it.
-        scope: the flights it has an effect on.
+        owner: the class of the field.
+        group, scope: as of `FlightOption`.
     """
 
-    def __init__(self, user: UserOption, scope: Scope = Scope.ANY) -> None:
+    def __init__(self, user: UserOption, owner: type, group: str, scope: Scope) -> None:
         kind, declared = user.declared.kind, user.option
         self.user = user
+        self.owner = owner
         name = f"no-{user.name}" if user.default is True and not user.name.startswith("no-") else user.name
         default = f" [default: {user.default_text}]" if user.default_text and kind is not bool else ""
         texts = get_origin(kind) is tuple and get_args(kind)[-1] is Ellipsis
@@ -81,12 +83,12 @@ class DeclaredOption(FlightOption):
         elif texts and (choices := choices_of(get_args(kind)[0])):
             valued = {"multiple": True, "type": click.Choice(choices)}
         elif texts:
-            valued = {"multiple": True, "metavar": user.placeholder}
+            valued = {"multiple": True, "metavar": user.placeholder, "type": get_args(kind)[0]}
         elif choices := choices_of(kind):
             valued = {"type": click.Choice(choices), "default": written(user.default) or None}
         super().__init__(
             [f"--{name}"],
-            group=MISSION_GROUP,
+            group=group,
             scope=scope,
             needs=declared.needs,
             replaces=declared.replaces,
@@ -107,16 +109,17 @@ class DeclaredOption(FlightOption):
 
 
 def declared_options(
-    kind: type, *, without: Collection[str] = (), scope: Scope = Scope.ANY
+    kind: type, *, without: Collection[str] = (), group: str = MISSION_GROUP, scope: Scope = Scope.ANY
 ) -> tuple[DeclaredOption, ...]:
     """The options of the fields of a class.
 
     Args:
         kind: the class, on `Options`.
         without: names of options that are left out.
-        scope: the flights they have an effect on.
+        group, scope: as of `FlightOption`.
     """
-    return tuple(DeclaredOption(user, scope) for user in user_options(kind) if user.name not in without)
+    users = (user for user in user_options(kind) if user.name not in without)
+    return tuple(DeclaredOption(user, kind, group, scope) for user in users)
 
 
 def chosen_names(context: click.Context) -> frozenset[str]:
@@ -128,9 +131,23 @@ def chosen_names(context: click.Context) -> frozenset[str]:
     )
 
 
+def specified(kind: type[T], **further: Any) -> T:
+    """An instance of a class with the values that the user specified of the running command's options.
+
+    Args:
+        kind: a class whose fields are options of the command, or one derived from it.
+        further: values of other fields, by name.
+
+    Raises:
+        click.UsageError, PlanError: a value is not accepted.
+    """
+    context = click.get_current_context()
+    return made(kind, context.command.get_params(context), context.params, chosen_names(context), further)
+
+
 def made(
     kind: type[T],
-    options: Iterable[FlightOption],
+    options: Iterable[click.Parameter],
     given: Given,
     chosen: Collection[str],
     further: Mapping[str, Any] = MappingProxyType({}),
@@ -139,7 +156,7 @@ def made(
 
     Args:
         kind: the class.
-        options: the options of its fields, and others, which are passed over.
+        options: options of a command, among them those of its fields.
         given: values of the command line's options.
         chosen: names of those that the user specified.
         further: values of other fields, by name.
@@ -148,7 +165,11 @@ def made(
         click.UsageError, PlanError: a value is not accepted.
     """
     values = dict(further)
-    mine = [option for option in options if isinstance(option, DeclaredOption) and option.name in chosen]
+    mine = [
+        option
+        for option in options
+        if isinstance(option, DeclaredOption) and option.name in chosen and issubclass(kind, option.owner)
+    ]
     held: dict[str, dict[str, Any]] = {}
     for option in mine:
         values_of = held.setdefault(option.user.path, {}) if option.user.path else values

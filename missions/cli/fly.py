@@ -9,18 +9,27 @@ import click
 from estimators.names import ESTIMATORS
 from missions.catalogue import NAMES
 from missions.cli.declared_options import FlightOption, Scope
-from missions.cli.fly_command import FlyCommand, flight_option
+from missions.cli.fly_command import (
+    ELSEWHERE,
+    EMBEDDED,
+    ESTIMATOR,
+    FLIGHT,
+    RESULTS,
+    VEHICLES,
+    FlyCommand,
+    flight_option,
+)
 from missions.cli.later import body_in
 from missions.cli.options import FIRMWARE_HELP, SECONDS, SPEEDUP, STRICT_HELP, WORLD_HELP, FiniteRange
 from missions.cli.signing import key_option
 
 _BODIES: Final = "missions.cli.bodies.fly"
-_link = partial(flight_option, group="Vehicles")
-_embedded = partial(flight_option, group="The embedded SITL", scope=Scope.EMBEDDED)
-_elsewhere = partial(flight_option, group="Vehicles elsewhere (--connect)", scope=Scope.CONNECTED)
-_flight = partial(flight_option, group="The flight")
-_estimator = partial(flight_option, group="An estimator beside it")
-_results = partial(flight_option, group="Results")
+_link = partial(flight_option, group=VEHICLES)
+_embedded = partial(flight_option, group=EMBEDDED, scope=Scope.EMBEDDED)
+_elsewhere = partial(flight_option, group=ELSEWHERE, scope=Scope.CONNECTED)
+_flight = partial(flight_option, group=FLIGHT)
+_estimator = partial(flight_option, group=ESTIMATOR)
+_results = partial(flight_option, group=RESULTS)
 _HELP: Final = f"""Fly MISSION: {", ".join(NAMES)}, a mission file (.plan, .waypoints), or a Python file of
 your own.
 
@@ -29,7 +38,12 @@ options)`. The run folder gets flight.tlog, summary.json and track.png.
 """
 
 
-@click.command(cls=FlyCommand, help=_HELP, context_settings={"show_default": True})
+@click.command(
+    cls=FlyCommand,
+    help=_HELP,
+    context_settings={"show_default": True},
+    params=[key_option(FlightOption, group=ELSEWHERE, scope=Scope.CONNECTED)],
+)
 @click.argument("mission")
 @_link("--vehicles", type=click.IntRange(1, 250), help="Team size. [default: 1, or one per --connect]")
 @_link("--connect", multiple=True, metavar="URL", help="Vehicle elsewhere: udpin:0.0.0.0:14550, serial:...")
@@ -138,6 +152,5 @@ options)`. The run folder gets flight.tlog, summary.json and track.png.
     help="File for the mission that would be uploaded (.plan, .waypoints), in place of a flight.",
 )
 @_results("--no-picture", is_flag=True, help="No picture track.png.")
-@key_option(cls=FlightOption, group="Vehicles elsewhere (--connect)", scope=Scope.CONNECTED)
 @body_in(_BODIES)
 def fly() -> None: ...

@@ -18,6 +18,14 @@ from missions.plan_files.suffixes import SUFFIXES as MISSION_FILES
 
 _OWN: Final = "a mission of your own"
 _FILE: Final = "a mission file"
+VEHICLES: Final = "Vehicles"
+EMBEDDED: Final = "The embedded SITL"
+FLIGHT: Final = "The flight"
+RESULTS: Final = "Results"
+ELSEWHERE: Final = "Vehicles elsewhere (--connect)"
+ESTIMATOR: Final = "An estimator beside it"
+_GROUPS: Final = (MISSION_GROUP, VEHICLES, EMBEDDED, FLIGHT, RESULTS, ELSEWHERE, ESTIMATOR)
+"""The headings of the help, in their order."""
 _COMMANDS: Final[Mapping[str, MissionCommand]] = {**COMMANDS, _OWN: OWN, _FILE: FILE}
 
 
@@ -83,7 +91,8 @@ class FlyCommand(click.Command):
         declared = ctx.meta.get("mission command")
         own = [] if declared is None else list(declared.options)
         common = super().get_params(ctx)
-        return [common[0], *own, *common[1:]]
+        arguments = [each for each in common if isinstance(each, click.Argument)]
+        return [*arguments, *own, *(each for each in common if each not in arguments)]
 
     def format_help_text(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         declared = ctx.meta.get("mission command")
@@ -98,7 +107,7 @@ class FlyCommand(click.Command):
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the options under the headings of their groups, the mission's own first."""
-        groups: dict[str, list[tuple[str, str]]] = {MISSION_GROUP: []}
+        groups: dict[str, list[tuple[str, str]]] = {name: [] for name in _GROUPS}
         for parameter in self.get_params(ctx):
             record = parameter.get_help_record(ctx) if isinstance(parameter, click.Option) else None
             if record is not None:

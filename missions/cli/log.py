@@ -7,12 +7,15 @@ from typing import Any, Final, TypeVar
 import click
 
 from autopilot_bridge.errors import BridgeError
+from missions.base.options import SeedOptions
+from missions.cli.declared_options import declared_options
 from missions.cli.later import body_in
-from missions.cli.options import FiniteRange, in_options
+from missions.cli.options import in_options
 from missions.cli.signing import key_option
+from missions.estimation.log_options import ExportOptions, LogSelection, PlayOptions
 
 _BODIES: Final = "missions.cli.bodies.log"
-_FORMATS: Final = ("csv", "parquet", "npz", "mcap")
+_SELECTION: Final = declared_options(LogSelection)
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 
@@ -32,37 +35,6 @@ def _dialect_option(command: Command) -> Command:
         metavar="NAME|FILE.xml",
         help="Dialect of a telemetry log. [default: all of MAVLink's messages]",
     )(command)
-
-
-def _selection_options(command: Command) -> Command:
-    for option in reversed(
-        (
-            click.option("--types", metavar="A,B", multiple=True, help="Messages. [default: all]"),
-            click.option("--source-system", type=click.IntRange(0, 255), multiple=True, metavar="N"),
-            click.option("--source-component", type=click.IntRange(0, 255), multiple=True, metavar="N"),
-            click.option(
-                "--condition",
-                metavar="TEXT",
-                help="Only messages for which it holds, by the newest values: 'HEARTBEAT.custom_mode == 4'.",
-            ),
-            click.option(
-                "--from",
-                "from_s",
-                type=FiniteRange(min=0.0),
-                metavar="S",
-                help="Begin at this time, seconds since the vehicle's boot, as log info prints it.",
-            ),
-            click.option("--to", "to_s", type=FiniteRange(min=0.0), metavar="S", help="End at this time."),
-            click.option(
-                "--boot",
-                type=click.IntRange(min=0),
-                metavar="N",
-                help="Boot of the vehicle, as log info numbers them. [default: all]",
-            ),
-        )
-    ):
-        command = option(command)
-    return command
 
 
 class _LogCommands(click.Group):
@@ -89,11 +61,9 @@ def info() -> None:
     """Duration, boots, flights, vehicles, modes, rates, gaps, loss; where every byte went."""
 
 
-@log.command()
+@log.command(params=[*_SELECTION, *declared_options(ExportOptions)])
 @_log_argument
 @_dialect_option
-@_selection_options
-@click.option("--format", "form", type=click.Choice(_FORMATS), default="csv", show_default=True)
 @click.option("--si", is_flag=True, help="SI units and radians in place of wire values (degE7, mG, ...).")
 @click.option(
     "--out",
@@ -105,21 +75,19 @@ def export() -> None:
     """Write messages to other tools' formats: Parquet, CSV, NumPy, MCAP."""
 
 
-@log.command()
+@log.command(params=[*_SELECTION])
 @_log_argument
 @click.argument("out", type=click.Path(path_type=Path))
 @_dialect_option
-@_selection_options
 @body_in(_BODIES)
 def cut() -> None:
     """Write a part of a telemetry log to OUT, its records as they are."""
 
 
-@log.command()
+@log.command(params=[*_SELECTION, *declared_options(SeedOptions)])
 @_log_argument
 @click.argument("out", type=click.Path(path_type=Path))
 @_dialect_option
-@_selection_options
 @click.option(
     "--fault",
     "faults",
@@ -130,31 +98,21 @@ def cut() -> None:
     "KIND: off, stuck, garbage, wrong, drift, noise, spike, slow, delayed, drop, intermittent. "
     "VALUE in SI units; times as of --from. May be repeated.",
 )
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
 @body_in(_BODIES)
 def mutate() -> None:
     """Write a telemetry log with faults to OUT: GPS off, spikes, noise, delays, lost messages, ..."""
 
 
-@log.command()
+@log.command(params=[*_SELECTION, *declared_options(PlayOptions), key_option()])
 @_log_argument
 @_dialect_option
-@_selection_options
 @click.option(
     "--link",
     required=True,
     metavar="URL",
     help="Link: udpout:127.0.0.1:14550, tcpin:127.0.0.1:5760, serial:/dev/ttyUSB0:57600, ...",
 )
-@click.option(
-    "--speed",
-    default="1",
-    show_default=True,
-    metavar="X",
-    help="Log seconds per wall second, from 0.1; or max.",
-)
 @click.option("--loop", is_flag=True, help="Begin again at the end, until Ctrl-C.")
-@key_option()
 @body_in(_BODIES)
 def play() -> None:
     """Play a telemetry log to a link, as if the vehicle were there; --from seeks."""

@@ -5,8 +5,9 @@ from typing import Final
 
 import click
 
+from estimators.survey.map_import_options import MapImport
+from missions.cli.declared_options import declared_options
 from missions.cli.later import body_in
-from missions.cli.options import FiniteRange
 
 _BODIES: Final = "missions.cli.bodies.map"
 
@@ -16,7 +17,7 @@ def magnetic_map() -> None:
     """Make magnetic maps from GeoTIFF, netCDF and line data, look into them, and export them."""
 
 
-@magnetic_map.command(context_settings={"show_default": True})
+@magnetic_map.command(params=[*declared_options(MapImport)])
 @click.argument("source", type=click.Path(path_type=Path, dir_okay=False))
 @click.option(
     "--out",
@@ -24,35 +25,7 @@ def magnetic_map() -> None:
     type=click.Path(path_type=Path, dir_okay=False),
     help="Map (.npz) that is written.",
 )
-@click.option(
-    "--values",
-    type=click.Choice(["total", "anomaly-wmm", "anomaly-igrf"]),
-    default="total",
-    help="Total field, or an anomaly that the main field of a model is added to.",
-)
-@click.option("--year", type=float, default=2026.0, help="Year of that main field.")
 @click.option("--home", metavar="LAT,LON,ALT", help="Origin of the map. [default: middle of the data, 0 m]")
-@click.option("--height", type=FiniteRange(), default=100.0, help="Above home, what the map is valid at, m.")
-@click.option("--spacing", type=float, default=100.0, help="Distance of the map's grid lines, m.")
-@click.option("--line-spacing", type=float, help="Distance of the survey's lines, m; needed for line data.")
-@click.option("--error", type=float, help="Standard deviation that the survey states, nT.")
-@click.option(
-    "--no-data",
-    type=float,
-    metavar="VALUE",
-    help="Value that stands for no data. [default: what the file marks as such]",
-)
-@click.option(
-    "--crs",
-    help="Coordinate reference system of the places, such as EPSG:32723, in place of the file's. [default: "
-    "the file's; WGS84 for tables, and for netCDF in degrees without one]",
-)
-@click.option(
-    "--column",
-    metavar="NAME",
-    help="Column or variable of the field; number or description of a GeoTIFF's band. [default: the one with "
-    "a usual name, such as total_field_nt, or the only one]",
-)
 @body_in(_BODIES)
 def make() -> None:
     """Make a map from SOURCE: GeoTIFF, netCDF, grids of Surfer and Esri, or line data (.csv, .csv.xz, .xyz).

@@ -10,11 +10,14 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
+import click
+
 from estimators.library import estimator_class
 from estimators.names import ESTIMATORS
 from flightsim.foundation.options import Declared, declared, unit_of
 from flightsim.foundation.user_options import choices_of, written
 from missions.cli.declared_options import DeclaredOption, Scope
+from missions.cli.main import command_line
 from missions.cli.mission_commands import COMMANDS
 from missions.cli.options import in_options
 
@@ -24,7 +27,7 @@ END: Final = "<!-- end -->"
 
 def tables() -> str:
     """All tables, as Markdown."""
-    return "\n".join((*_missions(), *_estimators()))
+    return "\n".join((*_missions(), *_commands(), *_estimators()))
 
 
 def with_tables(page: str) -> str:
@@ -47,13 +50,38 @@ def _missions() -> Iterator[str]:
         yield "| option | default | what it is |\n|---|---|---|"
         for option in command.options:
             if isinstance(option, DeclaredOption):
-                what = in_options(option.user.option.help)
-                if option.scope is Scope.EMBEDDED:
-                    what = f"{what} (embedded world)"
-                default = "" if option.is_flag else in_options(option.user.default_text)
-                words = " ".join((option.opts[0], option.user.placeholder)).strip()
-                yield _row(f"`{words}`", default, what)
+                yield _row_of(option, " (embedded world)" if option.scope is Scope.EMBEDDED else "")
         yield ""
+
+
+def commands_of(group: click.Group, path: str = "") -> Iterator[tuple[str, click.Command]]:
+    """All commands below a group, each with the words that call it."""
+    with click.Context(group) as context:
+        for name in group.list_commands(context):
+            command = group.get_command(context, name)
+            if isinstance(command, click.Group):
+                yield from commands_of(command, f"{path}{name} ")
+            elif command is not None:
+                yield f"{path}{name}", command
+
+
+def _commands() -> Iterator[str]:
+    yield "## Commands: options of each\n"
+    tables: dict[tuple[str, ...], list[str]] = {}
+    for name, command in commands_of(command_line):
+        if rows := tuple(_row_of(each) for each in command.params if isinstance(each, DeclaredOption)):
+            tables.setdefault(rows, []).append(name)
+    for rows, names in tables.items():  # commands with the same options have one table
+        yield f"### {', '.join(names)}\n"
+        yield "| option | default | what it is |\n|---|---|---|"
+        yield from rows
+        yield ""
+
+
+def _row_of(option: DeclaredOption, more: str = "") -> str:
+    default = "" if option.is_flag else in_options(option.user.default_text)
+    words = " ".join((option.opts[0], option.user.placeholder)).strip()
+    return _row(f"`{words}`", default, in_options(option.user.option.help) + more)
 
 
 def _estimators() -> Iterator[str]:

@@ -6,14 +6,14 @@ from typing import Final
 import click
 
 from estimators.names import ESTIMATORS
+from missions.cli.declared_options import declared_options
 from missions.cli.later import body_in
-from missions.cli.options import FiniteRange
+from missions.estimation.options import ReplayOptions
 
 _BODIES: Final = "missions.cli.bodies.replay"
-_SECONDS = FiniteRange(min=0.0, max=1e9)
 
 
-@click.command()
+@click.command(params=[*declared_options(ReplayOptions)])
 @click.argument("logs", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="LOG...")
 @click.option(
     "--estimator",
@@ -22,30 +22,6 @@ _SECONDS = FiniteRange(min=0.0, max=1e9)
     help=f"Estimator: {', '.join(ESTIMATORS)}, or a Python file with an Estimator of your own.",
 )
 @click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="Parameter of the estimator.")
-@click.option(
-    "--system-id", type=click.IntRange(1, 255), metavar="N", help="Vehicle. [default: all in a log]"
-)
-@click.option(
-    "--against",
-    type=click.Choice(["autopilot", "truth", "both"]),
-    default="both",
-    show_default=True,
-    help="Reference that the estimates are compared with; of both, the autopilot's word leads the summary.",
-)
-@click.option(
-    "--from",
-    "from_s",
-    type=_SECONDS,
-    metavar="S",
-    help="Begin at this time, seconds since the vehicle's boot, as log info prints it.",
-)
-@click.option("--to", "to_s", type=_SECONDS, metavar="S", help="End at this time.")
-@click.option(
-    "--boot",
-    type=click.IntRange(min=0),
-    metavar="N",
-    help="Boot of the vehicle, as log info numbers them. [default: all]",
-)
 @click.option(
     "--dialect", metavar="NAME|FILE.xml", help="Dialect of the logs. [default: all of MAVLink's messages]"
 )

@@ -12,7 +12,7 @@ from missions.cli.signing import key_option
 _BODIES: Final = "missions.cli.bodies.sitl"
 
 
-@click.command()
+@click.command(params=[key_option()])
 @click.option("--world", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE", help=WORLD_HELP)
 @click.option("--autopilot", type=click.Choice(["px4", "ardupilot"]), default="px4", show_default=True)
 @click.option("--firmware", metavar="NAME[=BUILD]", help=FIRMWARE_HELP)
@@ -91,7 +91,6 @@ _BODIES: Final = "missions.cli.bodies.sitl"
     metavar="NORTH,EAST",
     help="Place of a target's magnetic signature, m from the map's home.",
 )
-@key_option()
 @click.option(
     "--unsigned",
     type=click.Choice(["none", "serial", "local", "all"]),

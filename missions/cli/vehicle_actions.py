@@ -1,58 +1,51 @@
 """`flightstack vehicle return|land|hold|disarm|watch`: act on a vehicle without flying a mission."""
 
-from collections.abc import Callable
-from typing import Any, Final
+from typing import Final
 
 import click
 
 from missions.cli.later import body_in
 from missions.cli.signing import key_option
-from missions.cli.vehicle_link import connected
+from missions.cli.vehicle_link import CONNECTED
 
 _BODIES: Final = "missions.cli.bodies.vehicle_actions"
 
 
-def acting(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Decorator for the options of commands that use this program's own link to the vehicle."""
-    return connected(key_option()(command))
+_ACTING: Final = (*CONNECTED, key_option())
+"""The options of commands that use this program's own link to the vehicle."""
 
 
-@click.command(name="return")
-@acting
+@click.command(name="return", params=[*_ACTING])
 @body_in(_BODIES)
 def return_() -> None:
     """Command it to return home and land (RTL), and print what it answers and does."""
 
 
-@click.command()
-@acting
+@click.command(params=[*_ACTING])
 @body_in(_BODIES)
 def land() -> None:
     """Command it to land where it is, and print what it answers and does."""
 
 
-@click.command()
-@acting
+@click.command(params=[*_ACTING])
 @body_in(_BODIES)
 def hold() -> None:
     """Command it to hold its position (an aircraft circles), and print what it answers and does."""
 
 
-@click.command()
+@click.command(params=[*_ACTING])
 @click.option(
     "--force",
     is_flag=True,
     help="Disarming in the air too, after a question: the motors stop, and the vehicle falls.",
 )
 @click.option("--yes", is_flag=True, help="No question, with --force.")
-@acting
 @body_in(_BODIES)
 def disarm() -> None:
     """Disarm it on the ground; in the air it is refused, unless --force is given and confirmed."""
 
 
-@click.command()
-@acting
+@click.command(params=[*_ACTING])
 @body_in(_BODIES)
 def watch() -> None:
     """Show mode, height, battery and texts until Ctrl-C; nothing is commanded.

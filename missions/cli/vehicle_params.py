@@ -6,7 +6,7 @@ from typing import Final
 import click
 
 from missions.cli.later import body_in
-from missions.cli.vehicle_link import connected
+from missions.cli.vehicle_link import CONNECTED
 
 _BODIES: Final = "missions.cli.bodies.vehicle_params"
 
@@ -16,51 +16,45 @@ def params() -> None:
     """Parameters: list, get, set, save, load, compare."""
 
 
-@params.command("list")
+@params.command("list", params=[*CONNECTED])
 @click.argument("pattern", default="*")
-@connected
 @body_in(_BODIES)
 def list_() -> None:
     """List all parameters, or those whose names match PATTERN (for example MPC_*)."""
 
 
-@params.command()
+@params.command(params=[*CONNECTED])
 @click.argument("names", nargs=-1, required=True)
-@connected
 @body_in(_BODIES)
 def get() -> None:
     """Read parameters by name."""
 
 
-@params.command("set")
+@params.command("set", params=[*CONNECTED])
 @click.argument("name")
 @click.argument("value", type=float)
-@connected
 @body_in(_BODIES)
 def set_() -> None:
     """Set a parameter, and read it back. (A negative value: put -- before it.)"""
 
 
-@params.command()
+@params.command(params=[*CONNECTED])
 @click.argument("file", type=click.Path(path_type=Path))
-@connected
 @body_in(_BODIES)
 def save() -> None:
     """Save all parameters to FILE: .params (QGroundControl), .parm or .param (ArduPilot, MAVProxy)."""
 
 
-@params.command()
+@params.command(params=[*CONNECTED])
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option("--yes", is_flag=True, help="No question.")
-@connected
 @body_in(_BODIES)
 def load() -> None:
     """Set the parameters in FILE that differ on the vehicle, after asking; each is read back."""
 
 
-@params.command()
+@params.command(params=[*CONNECTED])
 @click.argument("other", metavar="FILE|defaults")
-@connected
 @body_in(_BODIES)
 def compare() -> None:
     """What differs from FILE, or from the firmware's defaults as PX4 1.16 and ArduPilot 4.6 have them.

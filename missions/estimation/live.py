@@ -5,7 +5,6 @@ processed it: a replay of that log gives the same estimates, bit for bit.
 """
 
 import asyncio
-import math
 import signal
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -17,14 +16,14 @@ from autopilot_bridge.clock import TelemetryClock, run, unix_time_us
 from autopilot_bridge.clock.pacing import wall_time_s
 from autopilot_bridge.links import VEHICLE_FORMS, Link, ReplayLog, open_link, parse_address
 from autopilot_bridge.mavlink import MAVLinkMessage, SigningKey
-from autopilot_bridge.mavlink.components import ONBOARD_COMPUTER_COMPONENT
 from autopilot_bridge.tlog import TlogWriter
 from estimators.errors import EstimatorError
 from estimators.fleet import Fleet
 from estimators.interface import Estimator
 from estimators.library import estimator_class, parameters_from
-from estimators.runner import ESTIMATOR_COMPONENTS, Runner
+from estimators.runner import Runner
 from missions.errors import LinkClosed
+from missions.estimation.options import LiveOptions
 from missions.estimation.rates import CHECK_PERIOD_S, RateWatch, interval_request
 from missions.estimation.report import EstimationResult, ReportRequest, report
 from missions.estimation.tap import TEAM_SYSTEM, EstimatorTap, Publisher
@@ -34,26 +33,19 @@ from missions.process.ending import end_signals
 from missions.vehicle.connection import Connection
 from missions.vehicle.signing import client_signing
 
-SILENCE_S: Final = 10.0
 _LOOK_S: Final = 0.25
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LiveRequest:
+class LiveRequest(LiveOptions):
     """The settings of an estimator process.
 
     Attributes:
         estimator: its name, or the path of a user's file.
         connect: connection string of the link.
         settings: parameters as NAME=VALUE.
-        duration_s: vehicle time since the vehicle was first received (wall time when the vehicle sends no
-            time); None: until it is stopped.
-        system_id: system id of the vehicle; None: the first vehicle received.
-        component_id: component id of the estimator.
         publish: whether estimates are sent on the link.
         request_rates: whether the message rates that the estimator needs are requested from the autopilot.
-        silence_s: wall time without a message from the vehicle after which the run ends.
-        against: what the estimates are compared with afterwards: "autopilot", "truth" or "both".
         out: run folder; None: the next `runs/<estimator>-<n>`.
         picture: whether to draw `errors.png`.
         command: the command line, for the summary.
@@ -64,28 +56,13 @@ class LiveRequest:
     estimator: str
     connect: str
     settings: Sequence[str] = ()
-    duration_s: float | None = None
-    system_id: int | None = None
-    component_id: int = ONBOARD_COMPUTER_COMPONENT
     publish: bool = True
     request_rates: bool = True
-    silence_s: float = SILENCE_S
-    against: str = "both"
     out: Path | None = None
     picture: bool = True
     command: str = ""
     signing_key: SigningKey | None = None
     on_open: Callable[[], object] = lambda: None
-
-    def __post_init__(self) -> None:
-        if self.component_id not in ESTIMATOR_COMPONENTS:
-            raise EstimatorError(
-                f"component id {self.component_id} is not an onboard computer's; "
-                f"give {min(ESTIMATOR_COMPONENTS)} to {max(ESTIMATOR_COMPONENTS)}"
-            )
-        for name, value in (("duration_s", self.duration_s), ("silence_s", self.silence_s)):
-            if value is not None and not 0.0 < value < math.inf:
-                raise EstimatorError(f"{name} {value:g} is not accepted; give seconds, above 0")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

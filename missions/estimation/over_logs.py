@@ -15,21 +15,19 @@ from estimators.logs import Log, LogError, open_log
 from estimators.logs.dialect import load_dialect
 from estimators.reports.summary import FAILED
 from missions.errors import PlanError
+from missions.estimation.options import ReplayOptions
 from missions.estimation.report import EstimationResult, ReportRequest, report
 from missions.flown.run_folder import RUNS, create_run_folder
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ReplayRequest:
+class ReplayRequest(ReplayOptions):
     """The settings of a replay.
 
     Attributes:
         logs: files; for an estimator of a team all of them are one team's.
         estimator: its name, or the path of a user's file.
         settings: parameters as NAME=VALUE.
-        system_id: the only vehicle to use; None: all in each log.
-        against: "autopilot", "truth" or "both".
-        from_s, to_s, boot: part of the logs to replay, with the meaning they have in `Log.inside`.
         dialect: dialect of telemetry logs; None: every message of MAVLink's public definitions.
         out: run folder; with several logs the folder that contains their run folders. None: the next
             `runs/<estimator>-<n>`.
@@ -40,17 +38,12 @@ class ReplayRequest:
     logs: Sequence[Path]
     estimator: str
     settings: Sequence[str] = ()
-    system_id: int | None = None
-    against: str = "both"
-    from_s: float | None = None
-    to_s: float | None = None
-    boot: int | None = None
     dialect: str | None = None
     out: Path | None = None
     picture: bool = True
     command: str = ""
 
-    def __post_init__(self) -> None:
+    def check_together(self) -> None:
         if not self.logs:
             raise EstimatorError("no log is given; give one or more")
         if self.from_s is not None and self.to_s is not None and self.from_s >= self.to_s:

@@ -15,6 +15,7 @@ from estimators.logs import Log, LogError, open_log
 from estimators.needs import Supply
 from estimators.reports.summary import COMPLETED, FAILED, assess
 from estimators.runner import EstimateTable
+from estimators.user_choices import Against
 from missions.flown.run_folder import replace_summary, versions, whole, write_summary
 
 PICTURE_NAME: Final = "errors.png"
@@ -45,7 +46,7 @@ class ReportRequest:
     logs: Sequence[Log] | Path
     fleet: Fleet
     settings: Sequence[str] = ()
-    against: str = "both"
+    against: str = Against.BOTH
     picture: bool = True
     wall_time_s: float = 0.0
     failure: str = ""

@@ -1,10 +1,9 @@
 """What a vision process is asked for, and what it reports."""
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar, Final, Protocol, TypeVar
+from typing import Any, ClassVar, Protocol, TypeVar
 
 from autopilot_bridge.mavlink import MAVLinkMessage, SigningKey
 from autopilot_bridge.mavlink.components import CAMERA_COMPONENTS, MOVING_POINT_COMPONENT
@@ -13,6 +12,7 @@ from estimators.handoff.motion_watch import MotionWatchParameters
 from estimators.messages import Message
 from estimators.vision import CameraDescription, TagDetectorParameters
 from estimators.vision.video import Picture, is_stream
+from missions.estimation.options import VisionOptions
 
 __all__ = [
     "COMPLETED",
@@ -28,7 +28,6 @@ __all__ = [
 ]
 
 COMPLETED, FAILED, INTERRUPTED = "completed", "failed", "interrupted"
-SILENCE_S: Final = 10.0
 
 Found = TypeVar("Found")
 
@@ -74,7 +73,7 @@ class PictureProcess(Protocol[Found]):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class VisionRequest:
+class VisionRequest(VisionOptions):
     """The settings of a vision process.
 
     Attributes:
@@ -83,12 +82,6 @@ class VisionRequest:
         connect: connection string of the vehicle's link; of a stream.
         log: the vehicle's log; of a recording.
         detector: parameters of the detector: of tags, or of what moves.
-        system_id: of the vehicle; None: the first autopilot received.
-        component_id: of the camera that the process is; None: 100, or 28 for what moves.
-        duration_s: vehicle time since the vehicle was first received; None: until it is stopped.
-        silence_s: wall time without a message of the vehicle, or without a first picture, after which the run
-            fails.
-        rate_hz: frames per second of a recording whose frames have no times; None: they have.
         film: keep the searched pictures of a stream as lossless video in the run folder.
         out: run folder; None: the next `runs/vision-<n>`.
         command: the command line, for the summary.
@@ -96,7 +89,7 @@ class VisionRequest:
         on_open: called once the link is open.
 
     Raises:
-        EstimatorError: a value is not possible.
+        EstimatorError, PlanError: a value is not possible.
     """
 
     video: str
@@ -104,18 +97,13 @@ class VisionRequest:
     connect: str | None = None
     log: Path | None = None
     detector: TagDetectorParameters | MotionWatchParameters = field(default_factory=TagDetectorParameters)
-    system_id: int | None = None
-    component_id: int | None = None
-    duration_s: float | None = None
-    silence_s: float = SILENCE_S
-    rate_hz: float | None = None
     film: bool = False
     out: Path | None = None
     command: str = ""
     signing_key: SigningKey | None = None
     on_open: Callable[[], object] = lambda: None
 
-    def __post_init__(self) -> None:
+    def check_together(self) -> None:
         if (self.connect is None) == (self.log is None):
             raise EstimatorError("give `connect` for a stream, or `log` for a recording, and not both")
         if is_stream(self.video) != (self.connect is not None):
@@ -130,9 +118,6 @@ class VisionRequest:
                 str(number) for number in sorted({self._components[0], self._components[-1]})
             )
             raise EstimatorError(f"component id {self.component_id} is not a camera's; give {accepted}")
-        for name, value in (("duration_s", self.duration_s), ("silence_s", self.silence_s)):
-            if value is not None and not 0.0 < value < math.inf:
-                raise EstimatorError(f"{name} {value:g} is not accepted; give seconds, above 0")
 
     @property
     def _components(self) -> range:

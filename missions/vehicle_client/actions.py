@@ -18,6 +18,7 @@ from missions.vehicle import Mode, Vehicle
 from missions.vehicle.connection import Connection
 from missions.vehicle.signing import client_signing
 from missions.vehicle.telemetry import Battery, Position
+from missions.vehicle_client.options import ConnectionOptions
 
 __all__ = ["VehicleState", "connected_vehicle", "disarm", "set_mode", "state", "watched"]
 
@@ -62,14 +63,13 @@ class VehicleState:
 
 @asynccontextmanager
 async def connected_vehicle(
-    address: Address, *, timeout_s: float, system_id: int | None, signing_key: SigningKey | None = None
+    address: Address, *, options: ConnectionOptions, signing_key: SigningKey | None = None
 ) -> AsyncIterator[Vehicle]:
     """Connect to a vehicle and wait for its heartbeat; nothing else is requested or commanded.
 
     Args:
         address: link of the vehicle.
-        timeout_s: time limit for its heartbeat.
-        system_id: of the vehicle; None: the first autopilot received.
+        options: which vehicle, and how long to wait for it.
         signing_key: shared with it; None: no signing.
 
     Raises:
@@ -79,13 +79,14 @@ async def connected_vehicle(
     """
     if isinstance(address, ReplayLog):
         raise PlanError(f"`connect` {address}: a log can't be commanded; give the link of a vehicle")
+    system_id = options.system_id
     connection = Connection(
         open_link(address), TelemetryClock(), vehicle_system_id=system_id, signing=client_signing(signing_key)
     )
     async with connection:
         vehicle = Vehicle(connection, system_id)
         try:
-            await vehicle.wait_heartbeat(timeout_s)
+            await vehicle.wait_heartbeat(options.timeout_s)
         except VehicleTimeout as error:
             others = ", ".join(map(str, connection.autopilots_received))
             received = f" (received: vehicle {others})" if others else ""

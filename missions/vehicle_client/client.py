@@ -34,6 +34,7 @@ from missions.kind import KIND_OF_TYPE, VehicleKind
 from missions.preflight.snapshot import FILTER_STATUS, Snapshot, usual
 from missions.vehicle.firmware_records import FIRMWARES
 from missions.vehicle_client.listening import listen
+from missions.vehicle_client.options import ConnectionOptions
 
 _FLAVOURS: Final = {dialect.MAV_AUTOPILOT_PX4: "px4", dialect.MAV_AUTOPILOT_ARDUPILOTMEGA: "ardupilot"}
 _LOOK_S: Final = 0.05
@@ -238,20 +239,19 @@ async def _missing(names: Collection[str], known: Container[str], timeout_s: flo
 
 
 @asynccontextmanager
-async def open_client(
-    address: Address, *, timeout_s: float = 10.0, system_id: int | None = None
-) -> AsyncIterator[VehicleClient]:
+async def open_client(address: Address, options: ConnectionOptions) -> AsyncIterator[VehicleClient]:
     """Connect, and find the vehicle. The context ends the connection.
 
     Args:
-        timeout_s: time limit for receiving a heartbeat of an autopilot.
-        system_id: system id of the vehicle; None: the first vehicle received.
+        address: the link.
+        options: which vehicle, and how long to wait for it.
 
     Raises:
         PlanError: MAVSDK does not support the link.
         MissionError: the link can't be opened, or no autopilot is received on it; the message names what was
             received.
     """
+    system_id, timeout_s = options.system_id, options.timeout_s
     url = mavsdk_url(address)
     texts: list[str] = []
 

@@ -21,6 +21,7 @@ from missions.preflight.snapshot import Snapshot
 from missions.vehicle.arming_reasons import PREARM_BIT
 from missions.vehicle_client.client import WANTED, VehicleClient, open_client
 from missions.vehicle_client.listening import SIGNED, LinkQuality, listen
+from missions.vehicle_client.options import ConnectionOptions
 from missions.vehicle_client.parameters import read_all
 
 _LISTEN_S: Final = 3.0
@@ -34,12 +35,12 @@ _DAY_S: Final = 86_400.0
 _SLOW_HEARTBEAT_HZ: Final = 0.7
 
 
-async def examine(
-    address: Address, *, timeout_s: float, system_id: int | None, unix_time_us: int
-) -> list[Finding]:
+async def examine(address: Address, options: ConnectionOptions, *, unix_time_us: int) -> list[Finding]:
     """Examine a vehicle; returns all findings, in the order of a manual inspection.
 
     Args:
+        address: the link.
+        options: which vehicle, and how long to wait for it.
         unix_time_us: time of this machine's clock when the examination begins.
 
     Raises:
@@ -47,8 +48,8 @@ async def examine(
         BridgeError: the link can't be opened.
     """
     begun_s = asyncio.get_running_loop().time()
-    quality = await listen(address, _LISTEN_S, system_id)
-    async with open_client(address, timeout_s=timeout_s, system_id=system_id) as client:
+    quality = await listen(address, _LISTEN_S, options.system_id)
+    async with open_client(address, options) as client:
         findings = [_who(client)]
         wanted = WANTED.get(client.flavour, WANTED["px4"])
         try:

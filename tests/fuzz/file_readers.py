@@ -22,7 +22,8 @@ from estimators.logs.dialect import load_dialect
 from estimators.observations import Image, ObservationWriter, read_observations
 from estimators.survey.compensation import Compensation, compensation_bytes, load_compensation
 from estimators.survey.lines import HEADER, load_lines
-from estimators.survey.map_import import MapImport, imported_map
+from estimators.survey.map_import import imported_map
+from estimators.survey.map_import_options import MapImport
 from estimators.vision import CameraDescription, CameraGeometry, load_camera
 from estimators.vision.video import Film, frames_of
 from flightsim.airframe import AirframeError

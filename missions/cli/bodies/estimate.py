@@ -10,6 +10,7 @@ from estimators.errors import EstimatorError
 from estimators.reports.summary import FAILED, INTERRUPTED, table_lines, warnings_of
 from missions.cli.bodies.signing import key_from, warn_if_open
 from missions.cli.bodies.status_line import StatusLine
+from missions.cli.declared_options import specified
 from missions.cli.options import in_options, report
 from missions.errors import PlanError
 from missions.estimation.live import LiveProgress, LiveRequest
@@ -48,17 +49,13 @@ def estimate(**given: Any) -> int:
     try:
         key = key_from(given["signing_key"])
         result = run_estimator(
-            LiveRequest(
+            specified(
+                LiveRequest,
                 estimator=given["name"],
                 connect=given["connect"],
                 settings=given["settings"],
-                duration_s=given["duration"],
-                system_id=given["system_id"],
-                component_id=given["component_id"],
                 publish=given["publish"],
                 request_rates=not given["no_request"],
-                silence_s=given["silence"],
-                against=given["against"],
                 out=given["out"],
                 picture=not given["no_picture"],
                 command=" ".join(["flightstack", *sys.argv[1:]]),

@@ -19,10 +19,13 @@ from estimators.logs.faults import parse_fault
 from estimators.logs.iterate import Selection
 from estimators.logs.mutate import mutated_records
 from estimators.logs.raw_records import positions, read_records, window, write_records
+from missions.base.options import SeedOptions
 from missions.cli.bodies.log_text import report_lines
 from missions.cli.bodies.signing import key_from, warn_if_open
 from missions.cli.bodies.status_line import StatusLine
+from missions.cli.declared_options import specified
 from missions.cli.options import in_options
+from missions.estimation.log_options import ExportOptions, LogSelection, PlayOptions
 from missions.runs.log_play import MIN_SPEED, Played
 from missions.runs.log_play import play as send
 from missions.vehicle.signing import client_signing
@@ -42,27 +45,28 @@ def _open(path: Path, dialect: str | None) -> Log:
     return open_log(path, dialect=dialect)
 
 
-def _select(log: Log, given: dict[str, Any]) -> list[Selection]:
-    names = [name.strip() for group in given["types"] for name in group.split(",") if name.strip()]
-    if given["types"] and not names:
+def _select(log: Log) -> list[Selection]:
+    chosen = specified(LogSelection)
+    names = [name.strip() for group in chosen.types for name in group.split(",") if name.strip()]
+    if chosen.types and not names:
         raise click.UsageError("--types names no message; give names such as ATTITUDE,GLOBAL_POSITION_INT")
     try:
-        condition = None if given["condition"] is None else Condition(given["condition"])
+        condition = None if chosen.condition is None else Condition(chosen.condition)
         selections = log.select(
             names or None,
-            system_id=given["source_system"] or None,
-            component_id=given["source_component"] or None,
+            system_id=chosen.source_system or None,
+            component_id=chosen.source_component or None,
             condition=condition,
         )
         there = {stream.name for stream, _ in selections}
         missing = [name for name in names if name.upper() not in {key.name.upper() for key in log.keys}]
         if there and missing:
             click.echo(f"{log.path} has no {', '.join(missing)}", err=True)
-        timed = given["from_s"] is not None or given["to_s"] is not None
-        if timed and given["boot"] is None and len(boots := log.boots_at(given["from_s"], given["to_s"])) > 1:
+        timed = chosen.from_s is not None or chosen.to_s is not None
+        if timed and chosen.boot is None and len(boots := log.boots_at(chosen.from_s, chosen.to_s)) > 1:
             several = ", ".join(map(str, boots))
             click.echo(f"the times fit to boots {several}; all count, --boot chooses one", err=True)
-        return window(log, selections, given["from_s"], given["to_s"], given["boot"])
+        return window(log, selections, chosen.from_s, chosen.to_s, chosen.boot)
     except NothingThere:
         raise  # an error about the content of the log, not about the arguments
     except BridgeError as error:
@@ -79,41 +83,41 @@ def info(path: Path, dialect: str | None, as_json: bool) -> None:
         click.echo(line)
 
 
-def export(path: Path, dialect: str | None, form: str, si: bool, out: Path | None, **given: Any) -> None:
+def export(path: Path, dialect: str | None, si: bool, out: Path | None, **_declared: Any) -> None:
     """`flightstack log export`."""
+    form = specified(ExportOptions).format
     opened = _open(path, dialect)
     target = out or path.with_name(
         f"{path.stem}-{form}" if form in ("csv", "parquet") else f"{path.stem}.{form}"
     )
-    written = write(opened, _select(opened, given), target, form, si=si)
+    written = write(opened, _select(opened), target, form, si=si)
     what = f"{len(written)} files in {target}" if len(written) > 1 else str(written[0])
     click.echo(f"written: {what}")
 
 
-def cut(path: Path, out: Path, dialect: str | None, **given: Any) -> None:
+def cut(path: Path, out: Path, dialect: str | None, **_declared: Any) -> None:
     """`flightstack log cut`."""
     opened = _open(path, dialect)
-    count = write_records(out, read_records(opened, positions(_select(opened, given))))
+    count = write_records(out, read_records(opened, positions(_select(opened))))
     click.echo(f"written: {out}, {count} of {len(opened)} messages")
 
 
-def mutate(
-    path: Path, out: Path, dialect: str | None, faults: Sequence[str], seed: int, **given: Any
-) -> None:
+def mutate(path: Path, out: Path, dialect: str | None, faults: Sequence[str], **_declared: Any) -> None:
     """`flightstack log mutate`."""
     try:
         parsed = [parse_fault(text) for text in faults]
     except BridgeError as error:
         raise click.UsageError(in_options(error)) from error
     opened = _open(path, dialect)
-    records = mutated_records(opened, _select(opened, given), parsed, seed=seed)
+    records = mutated_records(opened, _select(opened), parsed, seed=specified(SeedOptions).seed)
     click.echo(f"written: {out}, {write_records(out, records)} of {len(opened)} messages")
 
 
 def play(
-    path: Path, dialect: str | None, link: str, speed: str, loop: bool, signing_key: Path | None, **given: Any
+    path: Path, dialect: str | None, link: str, loop: bool, signing_key: Path | None, **_declared: Any
 ) -> None:
     """`flightstack log play`."""
+    speed = specified(PlayOptions).speed
     try:
         factor = math.inf if speed == "max" else float(speed)
     except ValueError:
@@ -126,7 +130,7 @@ def play(
     except BridgeError as error:
         raise click.UsageError(in_options(error)) from error
     opened = _open(path, dialect)
-    selections = _select(opened, given)
+    selections = _select(opened)
     line = StatusLine()
 
     def show(played: Played) -> None:

@@ -9,8 +9,8 @@ import numpy as np
 from estimators.errors import EstimatorError, LogError
 from estimators.logs.new_file import new_file
 from estimators.survey.map_export import exported_map
-from estimators.survey.map_import import MapImport, imported_map
-from estimators.survey.map_values import Values
+from estimators.survey.map_import import imported_map
+from estimators.survey.map_import_options import MapImport
 from flightsim.foundation.geodesy import GeodeticPosition
 from flightsim.foundation.magnetic_map_file import (
     MagneticMapError,
@@ -18,27 +18,14 @@ from flightsim.foundation.magnetic_map_file import (
     map_file_bytes,
     read_map_file,
 )
+from missions.cli.declared_options import specified
 from missions.cli.options import in_options
 
 
 def make(**given: Any) -> int:
     """`flightstack map make`."""
     try:
-        made = imported_map(
-            given["source"],
-            MapImport(
-                home=_home(given["home"]),
-                height_m=given["height"],
-                spacing_m=given["spacing"],
-                values=Values(given["values"]),
-                decimal_year=given["year"],
-                crs=given["crs"],
-                column=given["column"],
-                line_spacing_m=given["line_spacing"],
-                error_nt=given["error"],
-                no_data=given["no_data"],
-            ),
-        )
+        made = imported_map(given["source"], specified(MapImport, home=_home(given["home"])))
         with new_file(given["out"]) as part:
             part.write_bytes(map_file_bytes(made))
     except (EstimatorError, LogError) as error:

@@ -8,6 +8,7 @@ import click
 from estimators.errors import EstimatorError
 from estimators.logs import LogError
 from estimators.reports import notes_of, table_lines, warnings_of
+from missions.cli.declared_options import specified
 from missions.cli.options import in_options, report
 from missions.errors import PlanError
 from missions.estimation.over_logs import ReplayRequest, check_out, failed, replay_logs
@@ -35,15 +36,11 @@ def replay(**given: Any) -> int:
             click.echo(f"{label}: done", err=True)
 
     try:
-        request = ReplayRequest(
+        request = specified(
+            ReplayRequest,
             logs=given["logs"],
             estimator=given["estimator"],
             settings=given["settings"],
-            system_id=given["system_id"],
-            against=given["against"],
-            from_s=given["from_s"],
-            to_s=given["to_s"],
-            boot=given["boot"],
             dialect=given["dialect"],
             out=given["out"],
             picture=not given["no_picture"],

@@ -11,12 +11,14 @@ from autopilot_bridge.clock import unix_time_us
 from autopilot_bridge.clock.pacing import wall_time_s
 from missions.cli.bodies.status_line import StatusLine
 from missions.cli.bodies.vehicle_link import FAILED, address, confirm, print_json, run, with_client
+from missions.cli.declared_options import specified
 from missions.preflight.finding import Finding, Level
 from missions.vehicle_client import logs as client_logs
 from missions.vehicle_client.client import VehicleClient
 from missions.vehicle_client.doctor import examine
 from missions.vehicle_client.information import information
 from missions.vehicle_client.logs import VehicleLogs
+from missions.vehicle_client.options import ConnectionOptions
 
 _SHOWN_EVERY_S: Final = 0.2
 
@@ -155,12 +157,7 @@ def erase(yes: bool, **given: Any) -> int:
 def doctor(**given: Any) -> int:
     """`flightstack vehicle doctor`."""
     findings: list[Finding] = run(
-        examine(
-            address(given["connect"]),
-            timeout_s=given["timeout"],
-            system_id=given["system_id"],
-            unix_time_us=unix_time_us(),
-        )
+        examine(address(given["connect"]), specified(ConnectionOptions), unix_time_us=unix_time_us())
     )
     problems = [finding for finding in findings if finding.level is Level.PROBLEM]
     would_arm = not any(finding.subject == "arming" for finding in problems)

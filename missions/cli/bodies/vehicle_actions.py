@@ -12,9 +12,11 @@ from missions.cli.bodies.confirm import ask, can_ask
 from missions.cli.bodies.signing import key_from
 from missions.cli.bodies.status_line import StatusLine
 from missions.cli.bodies.vehicle_link import address, print_json, run
+from missions.cli.declared_options import specified
 from missions.vehicle import Mode, Vehicle
 from missions.vehicle_client import actions
 from missions.vehicle_client.actions import VehicleState, connected_vehicle, set_mode, state, watched
+from missions.vehicle_client.options import ConnectionOptions
 
 _STOP_MOTORS: Final = "stop the motors"
 _LOOK_S: Final = 0.2
@@ -27,9 +29,7 @@ def _with_vehicle(given: dict[str, Any], work: Callable[[Vehicle], Any]) -> Any:
     link, key = address(given["connect"]), key_from(given["signing_key"])
 
     async def whole() -> Any:
-        async with connected_vehicle(
-            link, timeout_s=given["timeout"], system_id=given["system_id"], signing_key=key
-        ) as vehicle:
+        async with connected_vehicle(link, options=specified(ConnectionOptions), signing_key=key) as vehicle:
             return await work(vehicle)
 
     return run(whole())

@@ -11,10 +11,12 @@ from autopilot_bridge.errors import AddressError, BridgeError
 from autopilot_bridge.links import VEHICLE_FORMS, Address, parse_address
 from autopilot_bridge.parameters import ParameterError
 from missions.cli.bodies.confirm import YES_WORDS, ask, can_ask, is_yes
+from missions.cli.declared_options import specified
 from missions.cli.options import in_options
 from missions.errors import MissionError, PlanError, VehicleTimeout
 from missions.vehicle_client.client import VehicleClient, open_client
 from missions.vehicle_client.listening import SIGNED, listen
+from missions.vehicle_client.options import ConnectionOptions
 
 T = TypeVar("T")
 FAILED: Final = 1
@@ -43,18 +45,18 @@ def with_client(
     given: Mapping[str, Any], work: Callable[[VehicleClient], Coroutine[Any, Any, T]], *, asks: bool = True
 ) -> T:
     """Run `work` with the vehicle that the options name; with `asks`, only if the vehicle answers."""
-    link = address(given["connect"])
+    link, options = address(given["connect"]), specified(ConnectionOptions)
 
     async def whole() -> T:
         answered = False
         try:
-            async with open_client(link, timeout_s=given["timeout"], system_id=given["system_id"]) as client:
+            async with open_client(link, options) as client:
                 answered = True
                 if asks:
                     await client.require_answers()
                 return await work(client)
         except VehicleTimeout as error:
-            if answered and (await listen(link, _LISTEN_S, given["system_id"])).signed:
+            if answered and (await listen(link, _LISTEN_S, options.system_id)).signed:
                 raise VehicleTimeout(f"{error}; {SIGNED}") from error
             raise
         raise AssertionError("not reached")

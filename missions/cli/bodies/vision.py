@@ -12,7 +12,7 @@ from estimators.handoff.motion_watch import MotionWatchParameters
 from estimators.vision import TagDetectorParameters
 from missions.cli.bodies.signing import key_from, warn_if_open
 from missions.cli.bodies.status_line import StatusLine
-from missions.cli.declared_options import chosen_names
+from missions.cli.declared_options import chosen_names, specified
 from missions.cli.options import in_options, report
 from missions.errors import PlanError
 from missions.estimation.vision import FAILED, INTERRUPTED, VisionProgress, VisionRequest, watch
@@ -28,12 +28,12 @@ def _detector(given: Mapping[str, Any]) -> TagDetectorParameters | MotionWatchPa
     """
     of_tags = given["detect"] == "tags"
     chosen = chosen_names(click.get_current_context())
-    idle = chosen & ({"ground_altitude"} if of_tags else {"tag_size", "tag_ids"})
+    idle = chosen & ({"ground_altitude"} if of_tags else {"tag_size", "tag_id"})
     for name in sorted(idle):
-        option = {"tag_ids": "--tag-id"}.get(name, "--" + name.replace("_", "-"))
+        option = "--" + name.replace("_", "-")
         raise click.UsageError(f"{option} has no effect with --detect {given['detect']}")
     if of_tags:
-        return TagDetectorParameters(size_m=given["tag_size"], tag_ids=given["tag_ids"])
+        return specified(TagDetectorParameters)
     return MotionWatchParameters(ground_altitude_m=given["ground_altitude"])
 
 
@@ -65,17 +65,13 @@ def vision(**given: Any) -> int:
     try:
         key = key_from(given["signing_key"])
         result = watch(
-            VisionRequest(
+            specified(
+                VisionRequest,
                 video=given["video"],
                 camera=given["camera"],
                 connect=connect,
                 log=given["log"],
                 detector=_detector(given),
-                system_id=given["system_id"],
-                component_id=given["component_id"],
-                duration_s=given["duration"],
-                silence_s=given["silence"],
-                rate_hz=given["rate"],
                 film=given["film"],
                 out=given["out"],
                 command=" ".join(["flightstack", *sys.argv[1:]]),

@@ -7,7 +7,8 @@ import pytest
 
 from estimators.errors import EstimatorError, LogError
 from estimators.survey.map_export import exported_map
-from estimators.survey.map_import import MapImport, imported_map
+from estimators.survey.map_import import imported_map
+from estimators.survey.map_import_options import MapImport
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from flightsim.foundation.magnetic_map_file import MapContents, map_file_bytes
 from missions.cli import main as cli

@@ -10,8 +10,8 @@ import pytest
 
 from estimators.errors import EstimatorError
 from estimators.survey import map_table
-from estimators.survey.map_import import MapImport, imported_map
-from estimators.survey.map_values import Values
+from estimators.survey.map_import import imported_map
+from estimators.survey.map_import_options import MapImport, Values
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from flightsim.foundation.magnetic_map_file import read_map_file
 from flightsim.foundation.magnetics import FieldModel

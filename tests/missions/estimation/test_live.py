@@ -336,8 +336,14 @@ def test_a_vehicle_that_is_not_there(tmp_path, port, vehicle, capfd):
         (["level", "--connect", "udpin:127.0.0.1:1"], f"there are {', '.join(ESTIMATORS)}"),
         ([LEVEL, "--connect", "carrier pigeon"], "carrier pigeon"),
         ([LEVEL, "--connect", "flight.tlog"], "that is a log; use flightstack replay"),
-        ([LEVEL, "--connect", "udpin:127.0.0.1:1", "--component-id", "1"], "is not in the range"),
-        ([LEVEL, "--connect", "udpin:127.0.0.1:1", "--duration", "0"], "is not in the range"),
+        (
+            [LEVEL, "--connect", "udpin:127.0.0.1:1", "--component-id", "1"],
+            "--component-id 1 is not in 191..194",
+        ),
+        (
+            [LEVEL, "--connect", "udpin:127.0.0.1:1", "--duration", "0"],
+            "--duration 0 is not possible; ask for more than 0",
+        ),
         ([LEVEL], "Missing option '--connect'"),
     ],
 )
