@@ -181,6 +181,20 @@ def test_the_command_line_states_no_default_of_its_own():
     assert further == []
 
 
+def test_no_command_states_a_number_of_its_own():
+    """Switches and paths have no field, nor texts without a default; a number and a default have one."""
+    plain = []
+    for name, command in options_page.commands_of(command_line):
+        for option in command.params:
+            if not isinstance(option, click.Option) or isinstance(option, DeclaredOption) or option.is_flag:
+                continue
+            number = isinstance(option.type, click.types.IntParamType | click.types.FloatParamType)
+            default = option.get_default(click.Context(command))
+            if number or (isinstance(default, str | int | float | tuple) and default):
+                plain.append(f"{name} {option.opts[0]}")
+    assert plain == []
+
+
 @pytest.mark.parametrize("kind", OWNERS, ids=lambda kind: kind.__name__)
 def test_a_command_makes_the_defaults_of_python(kind):
     with click.Context(OWNERS[kind]) as context:

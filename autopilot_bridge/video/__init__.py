@@ -4,6 +4,6 @@ Pictures are made in a separate process, and only while a player is connected or
 vehicles' process answers requests for a camera's view, and never waits.
 """
 
-from autopilot_bridge.video.service import CameraOnShow, VideoParameters, VideoService
+from flightsim.foundation.lazy_exports import lazy_exports
 
-__all__ = ["CameraOnShow", "VideoParameters", "VideoService"]
+__getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

@@ -9,7 +9,8 @@ from typing import Final
 from autopilot_bridge.payload import CameraComponent
 from autopilot_bridge.payload.camera_video import VideoStream
 from autopilot_bridge.sitl import Sitl
-from autopilot_bridge.video.service import CameraOnShow, VideoParameters, VideoService
+from autopilot_bridge.video.parameters import VideoParameters
+from autopilot_bridge.video.service import CameraOnShow, VideoService
 from flightsim.airframe import AirframeKind
 from flightsim.picture import Scenery
 

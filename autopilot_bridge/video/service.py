@@ -7,10 +7,8 @@ import subprocess
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any, Final, Protocol
 
-from autopilot_bridge.errors import BridgeError
 from autopilot_bridge.video.messages import (
     CameraSetup,
     StudioSetup,
@@ -20,50 +18,15 @@ from autopilot_bridge.video.messages import (
     unpack,
     view_to_json,
 )
+from autopilot_bridge.video.parameters import VideoError, VideoParameters
 from flightsim.payload import CameraView, ImagerParameters, PinholeModel
 from flightsim.picture import Scenery
 
-DEFAULT_PORT: Final = 8554
 _PORTS_TRIED: Final = 50
 _BACKLOG: Final = 16
 _QUEUE_BYTES: Final = 4 << 20  # photos that the picture process has not read yet
 _END_S: Final = 30.0  # time to write the pending files, since the last message
 _ENDED: Final = "the picture process has ended before photos or videos were written, which are lost"
-
-
-class VideoError(BridgeError):
-    """Pictures can't be served as requested."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class VideoParameters:
-    """How pictures are served.
-
-    Attributes:
-        host: address that players connect to.
-        port: for RTSP; 0: any; None: no streams.
-        any_port: when `port` is busy, the next free one is used.
-        folder: for photos and recordings; None: they are not stored. It is new or empty.
-        width_px: of streams and recordings.
-        rate_hz: pictures per second of streams (wall clock) and recordings (vehicle time).
-    """
-
-    host: str = "127.0.0.1"
-    port: int | None = DEFAULT_PORT
-    any_port: bool = True
-    folder: Path | None = None
-    width_px: int = 1280
-    rate_hz: float = 20.0
-
-    def __post_init__(self) -> None:
-        if self.host in ("", "0.0.0.0"):
-            raise VideoError(f"video host {self.host!r} is no address that players connect to; name one")
-        if self.port is not None and not 0 <= self.port <= 65535:
-            raise VideoError(f"video port {self.port} is not in 0..65535")
-        if not 16 <= self.width_px <= 4096:
-            raise VideoError(f"video width {self.width_px} px is not in 16..4096")
-        if not 0.1 <= self.rate_hz <= 100.0:
-            raise VideoError(f"video rate {self.rate_hz:g} Hz is not in 0.1..100")
 
 
 class Watched(Protocol):

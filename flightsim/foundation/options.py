@@ -17,7 +17,7 @@ from dataclasses import MISSING, dataclass, field, fields, is_dataclass, replace
 from enum import Enum
 from functools import cache
 from types import MappingProxyType
-from typing import Annotated, Any, Final, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Final, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from flightsim.foundation.checks import Bounds
 
@@ -234,7 +234,12 @@ class Declared:
         return self.unit == "degrees" and self.name.endswith("_rad")
 
     def check(self, value: Any) -> None:
-        """Raise OptionError for a number that is not accepted, or the first such number of a tuple."""
+        """Raise OptionError for a number that is not accepted, or the first such number of a tuple, or for a
+        word that is not a choice.
+        """
+        if get_origin(self.kind) is Literal and value not in get_args(self.kind):
+            reason = f"{value!r} is not one of {', '.join(map(str, get_args(self.kind)))}"
+            raise OptionError(self.name, reason, reason)
         for part in value if isinstance(value, tuple) else (value,):
             if not isinstance(part, int | float) or isinstance(part, bool | Enum):
                 continue
@@ -327,8 +332,25 @@ def declared(kind: type) -> Sequence[Declared]:
 
 @cache
 def _declared_fields(kind: Any) -> Sequence[Declared]:
-    hints = get_type_hints(kind, include_extras=True)
+    hints = _hints(kind)
     return tuple(_declared(kind, each, hints[each.name]) for each in fields(kind) if each.init)
+
+
+def _hints(kind: type) -> dict[str, Any]:
+    """The types of the fields; Any for one that is imported for type checkers only, which no user gives."""
+    try:
+        return get_type_hints(kind, include_extras=True)
+    except NameError:
+        pass
+    hints: dict[str, Any] = {}
+    for base in reversed(kind.__mro__):
+        for name, hint in vars(base).get("__annotations__", {}).items():
+            part = type("", (), {"__annotations__": {name: hint}, "__module__": base.__module__})
+            try:
+                hints |= get_type_hints(part, include_extras=True)
+            except NameError:
+                hints[name] = Any
+    return hints
 
 
 def _option_of(kind: type, each: Any) -> Option:

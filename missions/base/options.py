@@ -11,6 +11,8 @@ from flightsim.foundation.geodetic_position import GeodeticPosition
 from flightsim.foundation.options import OptionError, Options, option, other_default
 from missions.errors import PlanError
 
+MAX_VEHICLES: Final = 250
+"""Largest team."""
 MAX_SEARCH_TIME_S: Final = 24 * 3600.0
 _MIN_SIDE_M: Final = 1.0
 _MAX_PHASE_RAD: Final = math.radians(3600.0) + 1e-9
@@ -59,7 +61,7 @@ class MissionOptions(PlanOptions):
     """
 
     altitude_m: float = option(10.0, help="Height above home.")
-    vehicles: int = option(1, least=1, most=250)
+    vehicles: int = option(1, least=1, most=MAX_VEHICLES)
     index: int = 0
     separation_m: float = option(4.0, above=0.0, help="Distance between the altitudes of a team.")
     centre: GeodeticPosition | None = None

@@ -3,13 +3,13 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 from autopilot_bridge.mavlink import SigningKey
 from autopilot_bridge.mavlink.components import GROUND_STATION
 from missions.base.options import FlightOptions, MissionOptions
+from missions.base.run_options import RunOptions
 from missions.errors import PlanError
-from missions.vehicle.firmware import Mode
 from missions.vehicle.limits import FORECAST_WIND_M_S
 
 if TYPE_CHECKING:
@@ -17,27 +17,19 @@ if TYPE_CHECKING:
     from flightsim.world_spec import WorldSpec
     from missions.preflight.before_flight import Confirm
 
-REGAIN_S: Final = 60.0
-"""Longest time for which a lost link may stay lost, s."""
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RunRequest:
+class RunRequest(RunOptions):
     """All settings of a run except the mission itself.
 
     Attributes:
         options: options of the mission.
         connect: connection strings, one per vehicle; empty: the vehicles are embedded (SITL).
-        system_ids: system ids of the vehicles, one per connection; empty: the first vehicle received on each
-            connection.
         world: the embedded world; None: quadrotors with PX4 in still air, one per vehicle of the options.
             Missions and estimators can't reach it. With `connect` only its magnetic target is used, as the
             place that a result is compared with.
         firmware: the real firmware that flies the vehicles of the embedded world, which name it as their
             autopilot; None: the emulated autopilots.
-        speedup: simulated seconds per wall second at most in the embedded world; None: no limit.
-        forecast_wind_m_s: forecast wind that turns are planned for; None: 5 m/s. The wind of an embedded SITL
-            is not used: a mission plans in the same way for embedded and for other vehicles.
         parameters: autopilot parameters to set before the flight.
         strict_parameters: a parameter that a vehicle at `connect` does not have ends the run; otherwise it is
             left out. An embedded vehicle must have all of them.
@@ -45,8 +37,6 @@ class RunRequest:
         out: run folder; None: the next `runs/<mission>-<n>`.
         picture: whether to draw `track.png`.
         identity: MAVLink system and component id that the mission sends with.
-        on_failure: action that is commanded when the mission fails or is interrupted.
-        max_error_m: the run counts as failed when the path error exceeds it; None: no check.
         estimator: estimator that runs during the flight: its name, or the path of a user's file; None: no
             estimator.
         estimator_settings: its parameters as NAME=VALUE.
@@ -55,37 +45,26 @@ class RunRequest:
         confirm_simulations: whether vehicles that prove to be simulations are checked and confirmed, too.
         on_open: called once the links or the world are open.
         on_remark: receives what a user should know before the flight, one sentence each.
-        regain_s: longest time for which a lost link may stay lost before the mission fails, in seconds of
-            this machine's clock.
-        endurance_s: how long the battery of each vehicle lasts in flight, by the user; None: as the vehicle
-            reports, or by the model of an embedded multicopter.
         command: the command line, for the summary.
         signing_key: signing key, shared with vehicles that are not embedded; None: no signing.
     """
 
     options: MissionOptions = field(default_factory=FlightOptions)
     connect: Sequence[str] = ()
-    system_ids: Sequence[int] = ()
     world: "WorldSpec | None" = None
     firmware: "FirmwareBuild | None" = None
-    speedup: float | None = None
-    forecast_wind_m_s: float | None = None
     parameters: Mapping[str, float] = field(default_factory=dict)
     strict_parameters: bool = True
     left_out_parameters: Sequence[str] = ()
     out: Path | None = None
     picture: bool = True
     identity: tuple[int, int] = GROUND_STATION
-    on_failure: Mode = Mode.RETURN
-    max_error_m: float | None = None
     estimator: str | None = None
     estimator_settings: Sequence[str] = ()
     confirm: "Confirm | None" = None
     confirm_simulations: bool = True
     on_open: Callable[[], object] = lambda: None
     on_remark: Callable[[str], object] = lambda _text: None
-    regain_s: float = REGAIN_S
-    endurance_s: float | None = None
     command: str = ""
     signing_key: SigningKey | None = None
 

@@ -109,16 +109,24 @@ class DeclaredOption(FlightOption):
 
 
 def declared_options(
-    kind: type, *, without: Collection[str] = (), group: str = MISSION_GROUP, scope: Scope = Scope.ANY
+    kind: type,
+    *,
+    only: Collection[str] = (),
+    without: Collection[str] = (),
+    group: str = MISSION_GROUP,
+    scope: Scope = Scope.ANY,
 ) -> tuple[DeclaredOption, ...]:
     """The options of the fields of a class.
 
     Args:
         kind: the class, on `Options`.
+        only: names of the options; none: all of the class.
         without: names of options that are left out.
         group, scope: as of `FlightOption`.
     """
-    users = (user for user in user_options(kind) if user.name not in without)
+    users = (
+        user for user in user_options(kind) if user.name not in without and (user.name in only or not only)
+    )
     return tuple(DeclaredOption(user, kind, group, scope) for user in users)
 
 
@@ -131,18 +139,30 @@ def chosen_names(context: click.Context) -> frozenset[str]:
     )
 
 
-def specified(kind: type[T], **further: Any) -> T:
+def specified(kind: type[T], context: click.Context | None = None, /, **further: Any) -> T:
     """An instance of a class with the values that the user specified of the running command's options.
 
     Args:
         kind: a class whose fields are options of the command, or one derived from it.
+        context: the command with its values; None: the running one.
         further: values of other fields, by name.
 
     Raises:
         click.UsageError, PlanError: a value is not accepted.
     """
-    context = click.get_current_context()
+    context = context or click.get_current_context()
     return made(kind, context.command.get_params(context), context.params, chosen_names(context), further)
+
+
+def made_of_values(kind: type[T], given: Given) -> T:
+    """An instance of a class on `Options` with values of the options of its fields, which need not be those
+    of the command line: also those that a study was begun with.
+
+    Raises:
+        click.UsageError, PlanError: a value is not accepted.
+    """
+    chosen = {name for name, value in given.items() if value not in (None, (), False)}
+    return made(kind, declared_options(kind), given, chosen)
 
 
 def made(

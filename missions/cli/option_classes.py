@@ -34,3 +34,8 @@ PARTS: Final[Mapping[str, tuple[str, str]]] = MappingProxyType(
     }
 )
 """What is true in their embedded worlds."""
+
+RUNS: Final = tuple(
+    ("missions.base.run_options", name) for name in ("TeamOptions", "WorldOptions", "RunOptions")
+)
+"""The options of every run."""

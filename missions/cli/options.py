@@ -13,26 +13,7 @@ from flightsim.foundation.options import name_for_users
 from flightsim.foundation.plain_text import plain_text
 from flightsim.foundation.user_options import UserOption, user_options
 from missions.cli.later import named
-from missions.cli.option_classes import OPTIONS, PARTS
-
-
-class FiniteRange(click.FloatRange):
-    """A range of numbers that excludes infinity and NaN, which would compare as if it were in every range."""
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        """The number, or a usage error that names it."""
-        number: float = super().convert(value, param, ctx)
-        if not math.isfinite(number):
-            self.fail(f"{value} is not a finite number.", param, ctx)
-        return number
-
-
-SLOWEST: Final = 0.001
-SPEEDUP: Final = FiniteRange(min=SLOWEST, max=1e6)
-"""Simulated seconds per wall second."""
-
-SECONDS: Final = FiniteRange(min=0.0, max=86_400.0)
-"""A time of up to a day."""
+from missions.cli.option_classes import OPTIONS, PARTS, RUNS
 
 FIRMWARE_HELP: Final = (
     "Real firmware that flies the vehicles in lockstep with the world: px4=FOLDER (with bin/px4 and etc) or "
@@ -69,11 +50,11 @@ class DeclaredType(_ParamType):
         """The value, or a usage error that names it."""
         from flightsim.foundation.conversion import Conversion, Refused
 
-        if not isinstance(value, str):
-            return value
         count = self._count
         texts = Conversion(text=True)
         try:
+            if not isinstance(value, str):  # of a study's folder, whose values have types
+                return value if count > 1 else Conversion(text=False).value(self._user.declared.kind, value)
             if count == 1:
                 found = self._in_radians(self._one(texts, value))
                 if found is None:
@@ -132,7 +113,7 @@ _OF_REQUESTS: Final[Mapping[str, str]] = MappingProxyType(
 @cache
 def _names() -> Mapping[str, str]:
     """Names for users of the fields of all missions and of their worlds."""
-    classes = [named(place) for place in (*PARTS.values(), *reversed(list(OPTIONS.values())))]
+    classes = [named(place) for place in (*RUNS, *PARTS.values(), *reversed(list(OPTIONS.values())))]
     names: dict[str, str] = {}
     for user in (user for kind in classes for user in user_options(kind)):
         names |= {field.name: user.name for field in user.fields}

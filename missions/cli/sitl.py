@@ -5,36 +5,22 @@ from typing import Final
 
 import click
 
+from autopilot_bridge.video.parameters import VideoParameters
+from missions.base.run_options import ServedWorldOptions
+from missions.cli.declared_options import declared_options
 from missions.cli.later import body_in
-from missions.cli.options import FIRMWARE_HELP, STRICT_HELP, WORLD_HELP, FiniteRange
+from missions.cli.options import FIRMWARE_HELP, STRICT_HELP, WORLD_HELP
 from missions.cli.signing import key_option
 
 _BODIES: Final = "missions.cli.bodies.sitl"
 
 
-@click.command(params=[key_option()])
+_DECLARED: Final = (*declared_options(ServedWorldOptions), *declared_options(VideoParameters))
+
+
+@click.command(params=[*_DECLARED, key_option()])
 @click.option("--world", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE", help=WORLD_HELP)
-@click.option("--autopilot", type=click.Choice(["px4", "ardupilot"]), default="px4", show_default=True)
 @click.option("--firmware", metavar="NAME[=BUILD]", help=FIRMWARE_HELP)
-@click.option(
-    "--model",
-    multiple=True,
-    metavar="NAME|PATH",
-    help="One of our models, or a path; for all, or one for each (repeat, or A,B,C). [default: iris]",
-)
-@click.option(
-    "--launch",
-    type=click.Choice(["runway", "catapult", "hand"]),
-    help="Launch of aircraft. [default: as described with the model]",
-)
-@click.option("--count", type=click.IntRange(1, 250), default=1, show_default=True, help="Vehicles.")
-@click.option(
-    "--speedup",
-    type=FiniteRange(min=0.0, max=1e6),
-    default=1.0,
-    show_default=True,
-    help="Simulated seconds per wall second; 0: as fast as possible.",
-)
 @click.option(
     "--link",
     "links",
@@ -42,36 +28,6 @@ _BODIES: Final = "missions.cli.bodies.sitl"
     help="Link with onboard streams instead of the usual ports; with --count, all vehicles share it.",
 )
 @click.option("--gcs-link", "gcs_links", multiple=True, help="Link with ground-station streams.")
-@click.option(
-    "--home", help="Place of the home: lat,lon,alt[,heading]; default: where the firmware's own SITL stands."
-)
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
-@click.option(
-    "--wind",
-    default="0",
-    show_default=True,
-    help="Speed in m/s at 10 m above ground, with @DEG where it comes from.",
-)
-@click.option(
-    "--wind-profile",
-    type=click.Choice(["log", "power", "uniform"]),
-    default="log",
-    show_default=True,
-    help="Wind over height: logarithmic over open ground, power law of 1/7, or the same everywhere.",
-)
-@click.option(
-    "--turbulence",
-    type=click.Choice(["none", "light", "moderate", "severe"]),
-    default="none",
-    show_default=True,
-)
-@click.option(
-    "--gps",
-    type=click.Choice(["differential", "standalone"]),
-    default="differential",
-    show_default=True,
-    help="Receiver: decimetres with corrections, or metres that wander without.",
-)
 @click.option("--camera", is_flag=True, help="Every vehicle carries a camera on a gimbal.")
 @click.option(
     "--target",
@@ -92,13 +48,6 @@ _BODIES: Final = "missions.cli.bodies.sitl"
     help="Place of a target's magnetic signature, m from the map's home.",
 )
 @click.option(
-    "--unsigned",
-    type=click.Choice(["none", "serial", "local", "all"]),
-    default="serial",
-    show_default=True,
-    help="Links that take unsigned frames while there is a key: none, serial ones, this machine's too, all.",
-)
-@click.option(
     "--signing-store",
     type=click.Path(path_type=Path, dir_okay=False),
     metavar="FILE",
@@ -108,14 +57,6 @@ _BODIES: Final = "missions.cli.bodies.sitl"
     "--video",
     metavar="[HOST:]PORT|off",
     help="Address of the cameras' video (RTSP). [default: 127.0.0.1, from port 8554 on]",
-)
-@click.option(
-    "--video-rate",
-    type=float,
-    default=20.0,
-    show_default=True,
-    metavar="HZ",
-    help="Pictures per second: of wall time in streams, of vehicle time in recordings.",
 )
 @click.option(
     "--pictures",
@@ -139,9 +80,6 @@ _BODIES: Final = "missions.cli.bodies.sitl"
     help="Folder for the logs of a real firmware (.ulg, .bin) and what it prints.",
 )
 @click.option("--no-wait", is_flag=True, help="ArduPilot: don't wait for a client on the first port.")
-@click.option(
-    "--duration", type=FiniteRange(min=0.0, max=1e9), help="Stop after so many seconds of vehicle time."
-)
 @body_in(_BODIES)
 def sitl() -> None:
     """Simulated vehicles (SITL) for external clients: QGroundControl, MAVSDK, MAVProxy, DroneKit, mavutil.

@@ -6,16 +6,15 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from missions.cli.declared_options import Given
+from missions.cli.declared_options import Given, declared_options
 from missions.cli.later import later
-from missions.cli.options import FiniteRange
+from missions.studies.options import StudyRunOptions
 
 if TYPE_CHECKING:
     from missions.studies.study import Study
 
 
 _BODIES: Final = "missions.cli.bodies.study"
-_LIMIT: Final = FiniteRange(min=0.0, min_open=True, max=1e7)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,12 +56,7 @@ class StudyCommand:
 def engine_options() -> list[click.Parameter]:
     """The options of every study."""
     return [
-        click.Option(["--runs"], type=click.IntRange(1, 1_000_000), help="Runs per cell. [default: its own]"),
-        click.Option(["--seed"], type=click.IntRange(min=0), default=0, help="One seed makes one table."),
-        click.Option(
-            ["--workers"], type=click.IntRange(1, 4096),
-            help="Processes; 1: this process. With --ray: workers at most. [default: one per processor]",
-        ),
+        *declared_options(StudyRunOptions),
         click.Option(
             ["--ray"], metavar="ADDRESS",
             help="Ray cluster: HOST:PORT of its head, ray://HOST:PORT, auto, or local for one of this "
@@ -73,19 +67,7 @@ def engine_options() -> list[click.Parameter]:
             help="Folder, also s3://, gs:// and others of pyarrow.fs. [default: runs/STUDY-N]",
         ),
         click.Option(["--resume"], metavar="DIR|URI", help="Continue the study in this folder."),
-        click.Option(
-            ["--keep-logs"], type=click.Choice(["none", "failed", "all"]), default="none",
-            help="Trials whose files are kept, in logs/ of the folder.",
-        ),
-        click.Option(
-            ["--time-limit"], type=_LIMIT, metavar="S",
-            help="Terminate a trial after so many seconds of wall time. [default: no limit]",
-        ),
         click.Option(["--no-picture"], is_flag=True, help="No pictures."),
-        click.Option(
-            ["--trial"], type=click.IntRange(min=0), metavar="N",
-            help="Number of a trial that is run alone, in this process.",
-        ),
     ]  # fmt: skip
 
 

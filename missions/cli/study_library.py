@@ -1,13 +1,13 @@
 """The command lines of the package's studies."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from types import MappingProxyType
-from typing import Any, Final, TypeVar
+from typing import Any, Final
 
 import click
 
 from missions.base.options import PlanOptions
-from missions.cli.declared_options import FlightOption, Given, declared_options, made
+from missions.cli.declared_options import Given, declared_options, made_of_values
 from missions.cli.later import later
 from missions.cli.options import FIRMWARE_HELP
 from missions.cli.study_command import StudyCommand
@@ -21,27 +21,19 @@ from missions.studies.options import (
     VisionStudyOptions,
 )
 
-T = TypeVar("T")
-
 _FIRMWARE: Final = click.Option(["--firmware"], metavar="NAME[=BUILD]", help=FIRMWARE_HELP)
 
 
 def _study(name: str, kind: type[PlanOptions]) -> Callable[[Given], Any]:
     """What makes the study of a module of `missions.studies` from its options."""
     study = later(f"missions.studies.{name}", "study")
-    return lambda given: study(_made(kind, declared_options(kind), given))
+    return lambda given: study(made_of_values(kind, given))
 
 
 def _flights(name: str, kind: type[PlanOptions]) -> Callable[[Given], Any]:
     """As `_study`, of a study whose trials are flights."""
     study = _study(name, kind)
     return lambda given: later("missions.cli.bodies.study", "by_firmware")(study(given), given)
-
-
-def _made(kind: type[T], options: Iterable[FlightOption], given: Given) -> T:
-    return made(
-        kind, options, given, {name for name, value in given.items() if value not in (None, (), False)}
-    )
 
 
 STUDIES: Final[Mapping[str, StudyCommand]] = MappingProxyType(

@@ -6,8 +6,10 @@ from typing import Final
 
 import click
 
+from missions.cli.declared_options import declared_options
 from missions.cli.later import later
 from missions.cli.study_command import StudyCommand
+from missions.studies.options import SweepOptions
 
 
 class _SweepCommand(click.Command):
@@ -39,12 +41,7 @@ SWEEP: Final = StudyCommand(
         click.Argument(["mission"], required=False),
         click.Argument(["words"], nargs=-1, type=click.UNPROCESSED, metavar="[-- OPTIONS OF THE MISSION]"),
         click.Option(["--vary"], multiple=True, metavar="NAME=VALUES", help="Option and its values; repeat."),
-        click.Option(
-            ["--sampling"],
-            type=click.Choice(["latin-hypercube", "random"]),
-            default="latin-hypercube",
-            help="Way in which values of LOW..HIGH are drawn over the runs.",
-        ),
+        *declared_options(SweepOptions),
     ),
     build=later("missions.cli.bodies.sweep", "build"),
     kind=_SweepCommand,

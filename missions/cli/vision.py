@@ -11,10 +11,15 @@ from estimators.vision.tag_parameters import TagDetectorParameters
 from missions.cli.declared_options import declared_options
 from missions.cli.later import body_in
 from missions.cli.signing import key_option
-from missions.estimation.options import VisionOptions
+from missions.estimation.options import DetectorOptions, VisionOptions
 
 _BODIES: Final = "missions.cli.bodies.vision"
-_OPTIONS: Final = (*declared_options(VisionOptions), *declared_options(TagDetectorParameters), key_option())
+_OPTIONS: Final = (
+    *declared_options(VisionOptions),
+    *declared_options(DetectorOptions),
+    *declared_options(TagDetectorParameters),
+    key_option(),
+)
 
 
 @click.command(params=[*_OPTIONS])
@@ -28,14 +33,6 @@ _OPTIONS: Final = (*declared_options(VisionOptions), *declared_options(TagDetect
 @click.option(
     "--log", type=click.Path(path_type=Path), metavar="FILE.tlog", help="Vehicle's log, of a recording."
 )
-@click.option(
-    "--detect", type=click.Choice(["tags", "motion"]), default="tags", show_default=True,
-    help="Tags, or what moves on the ground (of a camera on a gimbal).",
-)  # fmt: skip
-@click.option(
-    "--ground-altitude", type=float, metavar="M",
-    help="Pressure altitude of the ground, for motion. [default: that before the vehicle is armed]",
-)  # fmt: skip
 @click.option("--film", is_flag=True, help="Lossless video of the searched pictures of a stream; large.")
 @click.option("--out", type=click.Path(path_type=Path), help="Run folder. [default: runs/vision-N]")
 @body_in(_BODIES)

@@ -1,6 +1,7 @@
 """What users set of an estimator process, of a replay, and of the search of a video."""
 
 from dataclasses import dataclass
+from typing import Literal
 
 from estimators.user_choices import ESTIMATOR_COMPONENTS, Against
 from flightsim.foundation.options import option
@@ -83,6 +84,23 @@ class LiveOptions(ProcessOptions):
         help="Component id of the estimator.",
     )
     against: Against = option(Against.BOTH, help="Reference that the estimates are compared with afterwards.")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DetectorOptions(PlanOptions):
+    """What is looked for in a video.
+
+    Attributes:
+        detect: tags, or what moves.
+        ground_altitude_m: pressure altitude of the ground; None: that before the vehicle is armed.
+    """
+
+    detect: Literal["tags", "motion"] = option(
+        "tags", help="Tags, or what moves on the ground (of a camera on a gimbal)."
+    )
+    ground_altitude_m: float | None = option(
+        None, varies="that before the vehicle is armed", help="Pressure altitude of the ground, for motion."
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

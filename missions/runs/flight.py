@@ -23,6 +23,7 @@ from missions.runs.limits_before_flight import adapted, vehicle_options
 from missions.runs.vehicle_opening import Stage
 from missions.vehicle.concurrency import run_concurrently
 from missions.vehicle.connection import Connection, Recorder
+from missions.vehicle.firmware import Mode
 from missions.vehicle.notes import FLIGHT
 from missions.vehicle.signing import client_signing, require_key
 from missions.vehicle.vehicle import Vehicle
@@ -245,7 +246,8 @@ async def _confirm(
 
 def _given_endurance(request: RunRequest) -> Endurance | None:
     """What the user knows of the battery."""
-    return None if request.endurance_s is None else Endurance(seconds=request.endurance_s, source="given")
+    minutes = request.endurance_min
+    return None if minutes is None else Endurance(seconds=60.0 * minutes, source="given")
 
 
 async def _remark_endurance(
@@ -273,7 +275,7 @@ async def _fly_one(
     """
     vehicle.notes.begin(FLIGHT, vehicle.clock.stamp_us)  # until the mission begins its own phase
     # The guard is inside: a sensor that stops ends `flying` only, and the vehicle is still left safe.
-    async with vehicle.safe_on_exit(request.on_failure):
+    async with vehicle.safe_on_exit(Mode(request.on_failure)):
         async with vehicle.sensors.guard() if watched else nullcontext():
             await flying
         if vehicle.armed and not vehicle.notes.aloft:

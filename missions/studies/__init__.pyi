@@ -9,6 +9,7 @@ from missions.studies.flights import FlightRow as FlightRow
 from missions.studies.flights import flown_by as flown_by
 from missions.studies.flights import fly_trial as fly_trial
 from missions.studies.inline import Inline as Inline
+from missions.studies.options import KeepLogs as KeepLogs
 from missions.studies.pool import Pool as Pool
 from missions.studies.ray_cluster import RayCluster as RayCluster
 from missions.studies.results import Results as Results
@@ -17,6 +18,5 @@ from missions.studies.running import read_results as read_results
 from missions.studies.running import run_study as run_study
 from missions.studies.running import run_trial as run_trial
 from missions.studies.study import Study as Study
-from missions.studies.trial_runner import KeepLogs as KeepLogs
 from missions.studies.trial_runner import local_file as local_file
 from missions.studies.trial_runner import trial_folder as trial_folder

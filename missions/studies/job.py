@@ -10,8 +10,9 @@ from types import MappingProxyType, ModuleType
 from typing import Any, Final
 
 from missions.errors import PlanError
+from missions.studies.options import KeepLogs
 from missions.studies.study import Study, Trials
-from missions.studies.trial_runner import KeepLogs, TrialRunner, error_text
+from missions.studies.trial_runner import TrialRunner, error_text
 
 __all__ = ["Job", "PackedJob", "load_study_module"]
 

@@ -6,13 +6,60 @@ from typing import Final
 
 from estimators.multi_target.parameters import Belief
 from flightsim.foundation.options import held, option
-from missions.base.options import PlanOptions
+from missions.base.options import PlanOptions, SeedOptions
 from missions.multi_target.options import MultiTargetOptions
 from missions.occupancy.parameters import Identify
 from missions.search.planner_parameters import PlannerParameters
 from missions.studies.multi_target_worlds import SearchWorlds
 
 TIMEOUT_S: Final = 900.0  # paper: 15 minutes
+
+
+class KeepLogs(StrEnum):
+    """The trials whose files are kept."""
+
+    NONE = "none"
+    FAILED = "failed"
+    ALL = "all"
+
+
+class Sampling(StrEnum):
+    """How values between two bounds are drawn."""
+
+    LATIN_HYPERCUBE = "latin-hypercube"
+    RANDOM = "random"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StudyRunOptions(SeedOptions):
+    """How a study is run; the meaning of the fields is that of `missions.studies.running.run_study`.
+
+    Attributes:
+        trial: number of the only trial that is run; None: all.
+    """
+
+    runs: int | None = option(None, least=1, most=1_000_000, varies="its own", help="Runs per cell.")
+    workers: int | None = option(
+        None,
+        least=1,
+        most=4096,
+        varies="one per processor",
+        help="Processes; 1: this process; with `ray`: workers at most.",
+    )
+    keep_logs: KeepLogs = option(KeepLogs.NONE, help="Trials whose files are kept, in logs/ of the folder.")
+    time_limit_s: float | None = option(
+        None, above=0.0, varies="no limit", help="Wall time after which a trial is terminated."
+    )
+    trial: int | None = option(None, least=0, help="Number of a trial that is run alone, in this process.")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SweepOptions(PlanOptions):
+    """What users set of a sweep."""
+
+    sampling: Sampling = option(
+        Sampling.LATIN_HYPERCUBE, help="Way in which values of LOW..HIGH are drawn over the runs."
+    )
 
 
 class Equations(StrEnum):

@@ -16,11 +16,12 @@ from missions.studies.engine import Engine, Progress
 from missions.studies.folder import SUMMARY, RowWriter, StudyFolder
 from missions.studies.inline import Inline
 from missions.studies.job import Job
+from missions.studies.options import KeepLogs
 from missions.studies.picture import draw_study
 from missions.studies.results import Results
 from missions.studies.study import Study, Trial, Trials
 from missions.studies.summary import study_table, summary_of
-from missions.studies.trial_runner import KeepLogs, Scratch, parameters_of, succeeded
+from missions.studies.trial_runner import Scratch, parameters_of, succeeded
 
 __all__ = ["StudyResult", "read_results", "run_study", "run_trial"]
 

@@ -7,7 +7,6 @@ import tempfile
 import traceback
 from collections.abc import Mapping
 from contextvars import ContextVar
-from enum import StrEnum
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -16,19 +15,12 @@ from threadpoolctl import threadpool_limits
 
 from autopilot_bridge.clock.pacing import wall_time_s
 from missions.errors import MissionError
+from missions.studies.options import KeepLogs
 from missions.studies.rows import TrialOutcome, TrialResult
 from missions.studies.study import Study, Trial, Trials
 from missions.studies.versions import software_versions
 
 __all__ = ["KeepLogs", "Scratch", "TrialRunner", "local_file", "trial_folder"]
-
-
-class KeepLogs(StrEnum):
-    """Which trials' files are kept."""
-
-    NONE = "none"
-    FAILED = "failed"
-    ALL = "all"
 
 
 def trial_folder() -> Path:

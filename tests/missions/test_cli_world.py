@@ -6,12 +6,14 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
+from autopilot_bridge.firmware_process.build import FirmwareBuild
 from flightsim.environment import CosineGust, Environment
 from flightsim.home import Home
 from flightsim.payload import GroundTargetParameters, MagneticSpec, Static
 from flightsim.wind_profile import WindLaw, WindProfile
 from flightsim.world_spec import HOMES, VehicleSpec, WorldSpec, team
 from missions.base.mission import WorldDefaults
+from missions.base.run_options import WorldOptions
 from missions.cli.bodies.world import world_of
 from missions.cli.fly import fly
 from missions.cli.sitl import sitl
@@ -20,10 +22,6 @@ from missions.occupancy.world import occupancy_world
 from missions.orbit.options import OrbitOptions
 from missions.orbit.world import orbit_world
 
-NOT_GIVEN = {
-    "world": None, "model": (), "autopilot": None, "firmware": None, "launch": None, "gps": None,
-    "home": None, "seed": 0, "wind": None, "wind_profile": "log", "turbulence": None,
-}  # fmt: skip
 FILE = """
 seed = 7
 home = {lat_deg = 47.0, lon_deg = 8.0, alt_m = 400, heading_deg = 90}
@@ -49,8 +47,15 @@ def file(tmp_path: Path) -> Path:
 
 
 def made(count: int | None = None, defaults: WorldDefaults | None = None, **given: object) -> WorldSpec:
-    chosen = frozenset(given) - {"world"}
-    return world_of({**NOT_GIVEN, **given}, chosen, count=count, defaults=defaults or WorldDefaults())
+    file, firmware = given.pop("world", None), given.pop("firmware", None)
+    return world_of(
+        WorldOptions(**given),
+        frozenset(given),
+        file=file,
+        firmware=None if firmware is None else FirmwareBuild.parse(firmware),
+        count=count,
+        defaults=defaults or WorldDefaults(),
+    )
 
 
 def test_without_a_file_the_options_and_the_defaults_of_the_mission_are_the_world() -> None:

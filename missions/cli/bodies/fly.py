@@ -1,6 +1,5 @@
 """What `flightstack fly` does."""
 
-import math
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -14,13 +13,14 @@ from autopilot_bridge.parameter_files import left_out
 from flightsim.world_spec import WorldSpec
 from missions.base.given_text import parameters_from_file
 from missions.base.mission import Mission
-from missions.base.request import REGAIN_S, RunRequest
+from missions.base.request import RunRequest
+from missions.base.run_options import TeamOptions, WorldOptions
 from missions.cli.bodies.confirm import confirmation
 from missions.cli.bodies.fly_report import KILLED, ProgressLine, leave_closed_terminal, print_result
 from missions.cli.bodies.params import known_to_all
 from missions.cli.bodies.signing import key_from, warn_if_open
 from missions.cli.bodies.world import firmware_of, world_of
-from missions.cli.declared_options import chosen_names
+from missions.cli.declared_options import chosen_names, specified
 from missions.cli.fly_command import refuse_idle_options
 from missions.cli.mission_command import MissionCommand
 from missions.cli.options import in_options, report
@@ -30,7 +30,6 @@ from missions.process.ending import signal_of
 from missions.runs.plan_export import export_plan
 from missions.runs.session import fly as fly_mission
 from missions.vehicle.connection import ONBOARD_COMPUTER
-from missions.vehicle.firmware import Mode
 
 _NAMES_SHOWN: Final = 20  # names of parameters that were left out; the summary has all
 _FORECAST_HEIGHT_M: Final = 100.0  # lower limit; above it the wind of a profile increases little
@@ -47,12 +46,20 @@ def fly(**given: Any) -> int:
         return KILLED + signal_of(interrupt)
 
 
-def _world(given: dict[str, Any], mission: Mission[Any], chosen: frozenset[str]) -> WorldSpec | None:
+def _world(context: click.Context, mission: Mission[Any], chosen: frozenset[str]) -> WorldSpec | None:
     """The embedded world without what the mission adds to it; None: the vehicles are connected by links."""
+    given = context.params
     if given["connect"]:
         return None
     try:
-        return world_of(given, chosen, count=given["vehicles"], defaults=mission.world_defaults)
+        return world_of(
+            specified(WorldOptions, context),
+            chosen,
+            file=given["world"],
+            firmware=firmware_of(given),
+            count=specified(TeamOptions, context).vehicles,
+            defaults=mission.world_defaults,
+        )
     except ValueError as error:
         raise click.UsageError(in_options(error)) from error
 
@@ -75,52 +82,40 @@ def flight_of(context: click.Context) -> tuple[Mission[Any], RunRequest]:
     mission = find_mission(given["mission"])
     declared: MissionCommand = context.meta["mission command"]
     chosen = chosen_names(context)
-    world = _world(given, mission, chosen)
+    world = _world(context, mission, chosen)
     count = len(given["connect"]) if world is None else len(world.vehicles)
-    options = declared.build(given, chosen, vehicles=given["vehicles"] or count)
+    options = declared.build(given, chosen, vehicles=specified(TeamOptions, context).vehicles or count)
     if world is not None:
         world = declared.with_world(given, chosen, options, world)
-    for name in ("expect_wind", "max_error"):
-        value = given[name]
-        zero = name == "expect_wind" and value == 0.0
-        if value is not None and not zero and not (math.isfinite(value) and value > 0.0):
-            raise click.UsageError(
-                f"--{name.replace('_', '-')} {value:g} is not possible; ask for more than 0"
-            )
     if given["system_id"] and len(given["system_id"]) != len(given["connect"]):
         raise click.UsageError(
             f"{len(given['system_id'])} --system-id for {len(given['connect'])} --connect; give one for each"
         )
-    forecast_m_s = given["expect_wind"]
-    if forecast_m_s is None and given["wind"] is not None and world is not None:
-        height_m = max(options.altitude_m, _FORECAST_HEIGHT_M)
-        forecast_m_s = world.air.wind_speed_m_s * world.air.profile.factor(height_m)
     parameters = {} if given["params"] is None else parameters_from_file(given["params"])
     left_out_parameters: tuple[str, ...] = ()
     if parameters and world is not None and given["firmware"] is None:
         parameters, left_out_parameters = known_to_all(parameters, world, strict=given["strict_params"])
 
-    request = RunRequest(
+    request = specified(
+        RunRequest,
+        context,
         options=options,
         connect=given["connect"],
-        system_ids=given["system_id"],
         world=world,
         firmware=firmware_of(given),
-        speedup=given["speedup"],
-        forecast_wind_m_s=forecast_m_s,
         parameters=parameters,
         strict_parameters=given["strict_params"],
         left_out_parameters=left_out_parameters,
         out=given["out"],
         picture=not given["no_picture"],
         identity=ONBOARD_COMPUTER if given["onboard"] else GROUND_STATION,
-        on_failure=Mode(given["on_failure"]),
-        max_error_m=given["max_error"],
-        regain_s=REGAIN_S if given["regain"] is None else given["regain"],
-        endurance_s=None if given["endurance"] is None else 60.0 * given["endurance"],
         estimator=given["estimator"],
         estimator_settings=given["settings"],
     )
+    if request.forecast_wind_m_s is None and given["wind"] is not None and world is not None:
+        height_m = max(options.altitude_m, _FORECAST_HEIGHT_M)
+        forecast_m_s = world.air.wind_speed_m_s * world.air.profile.factor(height_m)
+        request = replace(request, forecast_wind_m_s=forecast_m_s)
     return mission, request
 
 

@@ -19,18 +19,20 @@ from autopilot_bridge.mavlink.components import GROUND_STATION
 from autopilot_bridge.parameter_files import left_out
 from autopilot_bridge.sitl import PaceReport, Port, Sitl, SitlServer, compile_flight_code, emulated
 from autopilot_bridge.tlog import TlogWriter
+from autopilot_bridge.video import VideoParameters
 from flightsim.payload import MagneticSpec, magnetic_field_of
 from flightsim.world_spec import WorldSpec
 from missions.base.given_text import parameters_from_file
 from missions.base.mission import WorldDefaults
+from missions.base.run_options import ServedWorldOptions
 from missions.cli.bodies.params import known_to_all
 from missions.cli.bodies.signing import signed_how, vehicle_signing, warn_if_unsigned
 from missions.cli.bodies.status_line import StatusLine, announce_compiling
 from missions.cli.bodies.storage import Losses, VehicleCards
 from missions.cli.bodies.video import start_video
 from missions.cli.bodies.world import equipped, firmware_of, world_of
-from missions.cli.declared_options import chosen_names
-from missions.cli.options import SLOWEST, in_options, report
+from missions.cli.declared_options import chosen_names, specified
+from missions.cli.options import in_options, report
 from missions.process.ending import EndRequests
 
 _LOG_RATE_HZ = 4
@@ -112,8 +114,6 @@ def _recording(simulated: Sitl, path: str, losses: Losses) -> Iterator[None]:
 
 
 def sitl(
-    count: int,
-    speedup: float,
     links: tuple[str, ...],
     gcs_links: tuple[str, ...],
     camera: bool,
@@ -121,10 +121,8 @@ def sitl(
     map_file: str | None,
     map_target: str | None,
     video: str | None,
-    video_rate: float,
     pictures: Path | None,
     signing_key: Path | None,
-    unsigned: str,
     signing_store: Path | None,
     storage: str | None,
     params: str | None,
@@ -132,23 +130,23 @@ def sitl(
     log: str | None,
     firmware_logs: Path | None,
     no_wait: bool,
-    duration: float | None,
-    **_world: Any,
+    world: Path | None,
+    **_declared: Any,
 ) -> int:
     """`flightstack sitl`."""
-    if 0.0 < speedup < SLOWEST:
-        raise click.UsageError(f"--speedup {speedup:g} is slower than {SLOWEST:g}; 0 is as fast as possible")
-
     context = click.get_current_context()
     chosen = chosen_names(context)
     losses = Losses()
     with EndRequests() as ending, contextlib.ExitStack() as at_end:
         try:
+            options = specified(ServedWorldOptions)
             ports = _ports(links, gcs_links)
-            signing = vehicle_signing(signing_key, unsigned, signing_store, on_failure=losses.keys_not_stored)
+            signing = vehicle_signing(
+                signing_key, options.unsigned, signing_store, on_failure=losses.keys_not_stored
+            )
             firmware = firmware_of(context.params)
             spec = world_of(
-                context.params, chosen, count=count if "count" in chosen else None, defaults=WorldDefaults()
+                options, chosen, file=world, firmware=firmware, count=options.count, defaults=WorldDefaults()
             )
             parameters: dict[str, float] = {}
             if params is not None:
@@ -157,7 +155,10 @@ def sitl(
                 if names:
                     report(f"--params: {left_out(names)}")
             spec = _for_clients(
-                equipped(spec, camera, targets, map_file, map_target), speedup, parameters, unix_time_us()
+                equipped(spec, camera, targets, map_file, map_target),
+                options.speedup,
+                parameters,
+                unix_time_us(),
             )
             count = len(spec.vehicles)
             memory = VehicleCards(storage, count)
@@ -169,9 +170,14 @@ def sitl(
             if firmware is None:
                 compile_flight_code(spec.vehicles)
             server = SitlServer(
-                simulated, speedup=speedup or None, monotonic=wall_time_s, on_failure=losses.vehicle_failed
+                simulated,
+                speedup=options.speedup or None,
+                monotonic=wall_time_s,
+                on_failure=losses.vehicle_failed,
             )
-            pictured = start_video(simulated, video, video_rate, pictures, losses.picture_lost)
+            pictured = start_video(
+                simulated, video, specified(VideoParameters).rate_hz, pictures, losses.picture_lost
+            )
             if pictured is not None:
                 at_end.callback(pictured.close)
             if count > 1 and ports:
@@ -206,7 +212,7 @@ def sitl(
         server.run(
             lambda: ending.requested,
             report=show if line.terminal else None,
-            until_us=None if duration is None else round(duration * 1e6),
+            until_us=None if options.duration_s is None else round(options.duration_s * 1e6),
         )
     lost = f", {server.slipped_s:.1f} s behind real time" if server.slipped_s > 0.05 else ""
     click.echo(f"stopped at {simulated.time_us * 1e-6:.1f} s of vehicle time{lost}")

@@ -17,7 +17,7 @@ import click
 
 from missions.cli.bodies.status_line import StatusLine
 from missions.cli.bodies.world import firmware_of
-from missions.cli.declared_options import Given
+from missions.cli.declared_options import Given, made_of_values
 from missions.cli.mission_commands import arguments_of
 from missions.cli.options import in_options, report
 from missions.cli.study_command import StudyCommand
@@ -28,6 +28,7 @@ from missions.studies.flights import flown_by
 from missions.studies.folder import StudyFolder
 from missions.studies.inline import Inline
 from missions.studies.job import load_study_module
+from missions.studies.options import StudyRunOptions
 from missions.studies.pool import Pool
 from missions.studies.ray_cluster import RayCluster
 from missions.studies.running import StudyResult, run_study, run_trial
@@ -65,18 +66,18 @@ def by_firmware(study: Study[Any, Any], given: Given) -> Study[Any, Any]:
 def _run(declared: StudyCommand, name: str, given: dict[str, Any]) -> int:
     if given["resume"] is not None:
         _take_up(declared, name, given, StudyFolder.opened(given["resume"]).identity())
-    study = declared.build(given)
-    runs = study.runs if given["runs"] is None else given["runs"]
-    if given["trial"] is not None:
-        return _one_trial(study, runs, given["seed"], given["trial"])
+    study, how = declared.build(given), made_of_values(StudyRunOptions, given)
+    runs = study.runs if how.runs is None else how.runs
+    if how.trial is not None:
+        return _one_trial(study, runs, how.seed, how.trial)
     own = words_of(declared.options, given)
-    words = ["flightstack", "study", name, *own, "--runs", str(runs), "--seed", str(given["seed"])]
+    words = ["flightstack", "study", name, *own, "--runs", str(runs), "--seed", str(how.seed)]
 
     def repeat(trial: Trial) -> str:
         return shlex.join([*words, "--trial", str(trial.index)])
 
     arguments = {option.name: given[option.name] for option in declared.options if option.name is not None}
-    return _run_and_tell(study, given, repeat=repeat, arguments=arguments)
+    return _run_and_tell(study, how, given, repeat=repeat, arguments=arguments)
 
 
 def _take_up(declared: StudyCommand, study: str, given: dict[str, Any], identity: Mapping[str, Any]) -> None:
@@ -147,13 +148,19 @@ def _one_trial(study: Study[Any, Any], runs: int, seed: int, index: int) -> int:
 
 
 def _run_and_tell(
-    study: Study[Any, Any], given: Given, *, repeat: Callable[[Trial], str], arguments: Mapping[str, Any]
+    study: Study[Any, Any],
+    how: StudyRunOptions,
+    given: Given,
+    *,
+    repeat: Callable[[Trial], str],
+    arguments: Mapping[str, Any],
 ) -> int:
     """Run a study with the options of every study, and print its table; returns the exit code.
 
     Args:
         study: the study.
-        given: values of the options.
+        how: how it is run.
+        given: values of the other options.
         repeat: the command that repeats a trial.
         arguments: what `--resume` needs to build the study again.
     """
@@ -168,13 +175,13 @@ def _run_and_tell(
         with Ending():
             result = run_study(
                 study,
-                runs=given["runs"],
-                seed=given["seed"],
-                engine=engine_of(given),
+                runs=how.runs,
+                seed=how.seed,
+                engine=engine_of(how, given["ray"]),
                 out=given["out"],
                 resume=given["resume"],
-                keep_logs=given["keep_logs"],
-                time_limit_s=given["time_limit"],
+                keep_logs=how.keep_logs,
+                time_limit_s=how.time_limit_s,
                 picture=not given["no_picture"],
                 command=shlex.join(["flightstack", *sys.argv[1:]]),
                 repeat=repeat,
@@ -186,13 +193,13 @@ def _run_and_tell(
     return _tell(result)
 
 
-def engine_of(given: Given) -> Engine:
+def engine_of(how: StudyRunOptions, ray: str | None) -> Engine:
     """The engine that the options select."""
-    if given["ray"] is not None:
-        return RayCluster(given["ray"], workers=given["workers"])
-    if given["workers"] == 1 and given["time_limit"] is None:
+    if ray is not None:
+        return RayCluster(ray, workers=how.workers)
+    if how.workers == 1 and how.time_limit_s is None:
         return Inline()
-    return Pool(given["workers"])  # with a time limit, also one worker is a process, which can be terminated
+    return Pool(how.workers)  # with a time limit, also one worker is a process, which can be terminated
 
 
 def _tell(result: StudyResult) -> int:

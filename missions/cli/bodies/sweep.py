@@ -16,13 +16,14 @@ from missions.base.given_text import parse_wind
 from missions.base.mission import Mission
 from missions.base.request import RunRequest
 from missions.cli.bodies.fly import flight_of
-from missions.cli.declared_options import FlightOption, Given, Scope
+from missions.cli.declared_options import FlightOption, Given, Scope, made_of_values
 from missions.cli.fly import fly
 from missions.library import find_mission
 from missions.runs.limits_before_flight import check_request
 from missions.runs.vehicle_opening import VehicleOpener
 from missions.studies.design import Design, Value, grid, latin_hypercube, random_sample
 from missions.studies.flights import FlightRow, fly_trial
+from missions.studies.options import Sampling, SweepOptions
 from missions.studies.study import Study, Trials
 from missions.studies.trial_runner import local_file
 
@@ -118,7 +119,7 @@ def _without_wind(words: list[str]) -> list[str]:
 
 
 def sweep_study(
-    mission: str, vary: Sequence[str], words: Sequence[str], *, sampling: str
+    mission: str, vary: Sequence[str], words: Sequence[str], *, sampling: Sampling | str
 ) -> Study[Mapping[str, Value], FlightRow]:
     """The study of a sweep.
 
@@ -126,7 +127,7 @@ def sweep_study(
         mission: the mission: its name or its file.
         vary: "NAME=VALUE,VALUE,..." (a factor of the grid) or "NAME=LOW..HIGH" (drawn for each run).
         words: options of the mission, as for `flightstack fly`.
-        sampling: "latin-hypercube" or "random".
+        sampling: how values between two bounds are drawn.
 
     Raises:
         click.UsageError, PlanError: an option or a value is not accepted.
@@ -142,7 +143,7 @@ def sweep_study(
     factors = dict(_factor(text, options, flight.name) for text in vary)
     if len(factors) < len(vary):
         raise click.UsageError("--vary names an option twice; give its values in one --vary")
-    design = _design(factors, sampling)
+    design = _design(factors, Sampling(sampling))
     texts = [part for word in base for part in re.split(r"[,=]", word)]
     texts += [str(value) for cell in design.cells for value in cell.values()]
     trial = SweepTrial(
@@ -248,12 +249,12 @@ def _switch(option: FlightOption) -> tuple[tuple[str, ...], tuple[str, ...]]:
     return (option.opts[0],), tuple(option.secondary_opts[:1])
 
 
-def _design(factors: Mapping[str, list[Value] | tuple[float, float]], sampling: str) -> Design:
+def _design(factors: Mapping[str, list[Value] | tuple[float, float]], sampling: Sampling) -> Design:
     cells = grid(**{name: values for name, values in factors.items() if isinstance(values, list)})
     ranges = {name: values for name, values in factors.items() if isinstance(values, tuple)}
     if not ranges:
         return cells
-    return cells * (random_sample(**ranges) if sampling == "random" else latin_hypercube(**ranges))
+    return cells * (random_sample(**ranges) if sampling is Sampling.RANDOM else latin_hypercube(**ranges))
 
 
 def _digests(paths: Any) -> dict[str, str]:
@@ -267,4 +268,5 @@ def build(given: Given) -> Study[Any, Any]:
         raise click.UsageError(
             "sweep needs a MISSION: its name or its file; flightstack fly --help lists them"
         )
-    return sweep_study(given["mission"], given["vary"], given["words"], sampling=given["sampling"])
+    sampling = made_of_values(SweepOptions, given).sampling
+    return sweep_study(given["mission"], given["vary"], given["words"], sampling=sampling)

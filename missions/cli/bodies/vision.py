@@ -1,7 +1,6 @@
 """What `flightstack vision` does."""
 
 import sys
-from collections.abc import Mapping
 from typing import Any
 
 import click
@@ -15,26 +14,28 @@ from missions.cli.bodies.status_line import StatusLine
 from missions.cli.declared_options import chosen_names, specified
 from missions.cli.options import in_options, report
 from missions.errors import PlanError
+from missions.estimation.options import DetectorOptions
 from missions.estimation.vision import FAILED, INTERRUPTED, VisionProgress, VisionRequest, watch
 
 _FAILED, _INTERRUPTED = 1, 130
 
 
-def _detector(given: Mapping[str, Any]) -> TagDetectorParameters | MotionWatchParameters:
+def _detector() -> TagDetectorParameters | MotionWatchParameters:
     """Parameters of the detector; options of the other one are refused.
 
     Raises:
         click.UsageError: an option that has no effect.
     """
-    of_tags = given["detect"] == "tags"
+    options = specified(DetectorOptions)
+    of_tags = options.detect == "tags"
     chosen = chosen_names(click.get_current_context())
     idle = chosen & ({"ground_altitude"} if of_tags else {"tag_size", "tag_id"})
     for name in sorted(idle):
         option = "--" + name.replace("_", "-")
-        raise click.UsageError(f"{option} has no effect with --detect {given['detect']}")
+        raise click.UsageError(f"{option} has no effect with --detect {options.detect}")
     if of_tags:
         return specified(TagDetectorParameters)
-    return MotionWatchParameters(ground_altitude_m=given["ground_altitude"])
+    return MotionWatchParameters(ground_altitude_m=options.ground_altitude_m)
 
 
 class _ProgressLine:
@@ -71,7 +72,7 @@ def vision(**given: Any) -> int:
                 camera=given["camera"],
                 connect=connect,
                 log=given["log"],
-                detector=_detector(given),
+                detector=_detector(),
                 film=given["film"],
                 out=given["out"],
                 command=" ".join(["flightstack", *sys.argv[1:]]),

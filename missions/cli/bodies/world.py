@@ -1,10 +1,10 @@
 """The world from the command line: a file, the options that override it, or the options alone."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from autopilot_bridge.firmware_process.build import FirmwareBuild
 from flightsim.environment import Environment
@@ -14,10 +14,13 @@ from flightsim.wind_profile import WindLaw, WindProfile
 from flightsim.world_spec import VehicleSpec, WorldSpec, launched
 from missions.base.given_text import parse_wind
 from missions.base.mission import WorldDefaults
+from missions.base.run_options import WorldOptions
 from missions.cli.declared_options import Given
 from missions.worlds.motion_kind import MotionKind
 from missions.worlds.motions import motion_of
 from missions.worlds.payloads import CAMERA, MAGNETOMETER, carrying
+
+_USUAL: Final = VehicleSpec()
 
 
 def models_of(given: tuple[str, ...]) -> list[str]:
@@ -46,73 +49,81 @@ def firmware_of(given: Given) -> FirmwareBuild | None:
 
 
 def world_of(
-    given: Given, chosen: frozenset[str], *, count: int | None, defaults: WorldDefaults
+    options: WorldOptions,
+    chosen: frozenset[str],
+    *,
+    file: Path | None,
+    firmware: FirmwareBuild | None,
+    count: int | None,
+    defaults: WorldDefaults,
 ) -> WorldSpec:
     """The world of `fly` or `sitl`.
 
     Args:
-        given: values of the options `world`, `model`, `autopilot`, `firmware`, `launch`, `gps`, `home`,
-            `seed`, `wind`, `wind_profile`, `turbulence`.
-        chosen: names of the options that the user specified.
+        options: the options.
+        chosen: names of those that the user specified.
+        file: description of the world, which they override; None: none.
+        firmware: real firmware that flies the vehicles; None: the emulated autopilots.
         count: number of vehicles that the user specified; None: as many as models, or as the file has.
         defaults: values where neither an option nor a file gives one.
 
     Raises:
         ValueError: a value is not accepted.
     """
-    build = firmware_of(given)
-    if build is not None:
-        if "autopilot" in chosen and given["autopilot"] != build.firmware:
-            raise ValueError(
-                f"--autopilot {given['autopilot']} and --firmware {build}: leave one of them out"
-            )
-        given, chosen = {**given, "autopilot": build.firmware}, chosen | {"autopilot"}
-    models = models_of(given["model"])
-    home = given["home"]
-    file = None if given["world"] is None else WorldSpec.load(given["world"])
-    if file is None:
+    autopilot: str | None = options.autopilot
+    if firmware is not None:
+        if autopilot is not None and autopilot != firmware.firmware:
+            raise ValueError(f"--autopilot {autopilot} and --firmware {firmware}: leave one of them out")
+        autopilot = firmware.firmware
+    models = models_of(options.model)
+    home = options.home
+    described = None if file is None else WorldSpec.load(file)
+    if described is None:
         chosen = chosen | {"seed", "wind", "wind_profile", "turbulence"}
-    if file is None or file.home is None:
+    if described is None or described.home is None:
         home = home or defaults.home
     fields: dict[str, Any] = {}
     if home is not None:
         fields["home"] = Home.parse(home)
     if "seed" in chosen:
-        fields["seed"] = given["seed"]
+        fields["seed"] = options.seed
     if chosen & {"wind", "wind_profile", "turbulence"}:
-        fields["air"] = _air(given, chosen, file, defaults)
-    if file is None or file.vehicles == (VehicleSpec(),):  # the file lists no vehicles
+        fields["air"] = _air(options, chosen, described, defaults)
+    if described is None or described.vehicles == (VehicleSpec(),):  # the file lists no vehicles
         models = models or [defaults.model]
         team = WorldSpec.of_team(
             count,
             model=models[0] if len(models) == 1 else models,
-            autopilot=given["autopilot"] or defaults.autopilot or "px4",
-            launch=given["launch"],
-            gps=given["gps"] or "differential",
-            home=fields.get("home", None if file is None else file.home),
+            autopilot=autopilot or defaults.autopilot or _USUAL.autopilot,
+            launch=options.launch,
+            gps=options.gps or _USUAL.gps,
+            home=fields.get("home", None if described is None else described.home),
         )
-        return replace(file or team, vehicles=team.vehicles, **fields)
-    world = replace(file, **fields)
+        return replace(described or team, vehicles=team.vehicles, **fields)
+    world = replace(described, **fields)
     if count is not None and count != len(world.vehicles):
         raise ValueError(
-            f"{given['world']} has {len(world.vehicles)} vehicles; accepted with it: {len(world.vehicles)}"
+            f"{file} has {len(world.vehicles)} vehicles; accepted with it: {len(world.vehicles)}"
         )
-    return replace(world, vehicles=_overridden(world.vehicles, given, chosen, models))
+    given = {name: value for name, value in (("autopilot", autopilot), ("gps", options.gps)) if value}
+    return replace(world, vehicles=_overridden(world.vehicles, given, options.launch, models))
 
 
-def _air(given: Given, chosen: frozenset[str], file: WorldSpec | None, defaults: WorldDefaults) -> Any:
+def _air(
+    options: WorldOptions, chosen: frozenset[str], file: WorldSpec | None, defaults: WorldDefaults
+) -> Any:
     """The air with the options' values; what no option gives is the file's."""
     before = Environment() if file is None else file.air
     speed_m_s, from_deg = before.wind_speed_m_s, before.wind_from_deg
     if "wind" in chosen:
-        speed_m_s, from_deg = parse_wind(given["wind"] if given["wind"] is not None else defaults.wind)
-    law = WindLaw(given["wind_profile"])
+        speed_m_s, from_deg = parse_wind(defaults.wind if options.wind is None else options.wind)
+    law = WindLaw(options.wind_profile)
     stated = file is not None and "wind_profile" not in chosen
     return Environment.from_wind(
         speed_m_s=speed_m_s,
         from_deg=from_deg,
         profile=before.profile if stated else WindProfile(law=law),
-        turbulence=(given["turbulence"] or defaults.turbulence)
+        turbulence=(options.turbulence or defaults.turbulence)
         if "turbulence" in chosen
         else before.turbulence,
         gusts=before.gusts,
@@ -122,7 +133,7 @@ def _air(given: Given, chosen: frozenset[str], file: WorldSpec | None, defaults:
 
 
 def _overridden(
-    vehicles: Sequence[VehicleSpec], given: Given, chosen: frozenset[str], models: Sequence[str]
+    vehicles: Sequence[VehicleSpec], given: Mapping[str, Any], launch: str | None, models: Sequence[str]
 ) -> tuple[VehicleSpec, ...]:
     """The vehicles of a file with the values of options."""
     if models:
@@ -131,10 +142,8 @@ def _overridden(
             raise ValueError(f"{len(models)} models for {count} vehicles; accepted: one for all, or {count}")
         each = [models[0]] * count if len(models) == 1 else models
         vehicles = [replace(v, model=model) for v, model in zip(vehicles, each, strict=True)]
-    for name in ("autopilot", "gps"):
-        if name in chosen:
-            vehicles = [replace(vehicle, **{name: given[name]}) for vehicle in vehicles]
-    return launched(vehicles, given["launch"]) if "launch" in chosen else tuple(vehicles)
+    vehicles = [replace(vehicle, **given) for vehicle in vehicles]
+    return tuple(vehicles) if launch is None else launched(vehicles, launch)
 
 
 def equipped(

@@ -178,10 +178,10 @@ def test_the_engine_and_the_paths_are_not_taken_from_a_study_folder(
     engines: list[tuple[object, ...]] = []
     monkeypatch.setattr(
         "missions.cli.bodies.study.engine_of",
-        lambda given: engines.append((given["ray"], given["workers"], given["out"], given["keep_logs"])),
+        lambda how, ray: engines.append((ray, how.workers, how.keep_logs)),
     )
     assert ran("lissajous-localization", "--no-picture", "--resume", out)[0] == 0
-    assert engines == [(None, None, None, "none")] and not elsewhere.exists()
+    assert engines == [(None, None, "none")] and not elsewhere.exists()
 
 
 @pytest.mark.parametrize("key", ["mission", "words", "vary"])

@@ -19,9 +19,10 @@ from pyarrow import fs
 from missions.errors import PlanError
 from missions.studies import read_results, run_study
 from missions.studies.folder import RowWriter, StudyFolder
+from missions.studies.options import KeepLogs
 from missions.studies.running import identity_of
 from missions.studies.study import Trials
-from missions.studies.trial_runner import KeepLogs, TrialRunner
+from missions.studies.trial_runner import TrialRunner
 from tests.clients.tied_process import tied
 from tests.missions.studies.small import STUDY
 
