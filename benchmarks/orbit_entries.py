@@ -20,6 +20,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from estimators.orbit_target.parameters import OrbitTargetParameters
 from flightsim.environment import Environment
 from flightsim.world_spec import WorldSpec
 from missions.base.given_text import parse_wind
@@ -82,8 +83,9 @@ class Case:
             direction=Direction.CW if self.direction == "cw" else Direction.CCW,
             duration_s=duration_s,
             radius_m=radius_m,
-            target_speed_m_s=self.target_speed_m_s,
-            target_heading_rad=math.radians(45.0),
+            estimator=OrbitTargetParameters(
+                target_speed_m_s=self.target_speed_m_s, target_heading_rad=math.radians(45.0)
+            ),
             entry_bearing_rad=math.radians(entry.bearing_deg),
             entry_distance_m=entry.distance_m,
             entry_heading_rad=math.radians(entry.heading_deg),

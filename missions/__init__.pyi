@@ -1,5 +1,6 @@
 """Public names of `missions`, each where it is defined; see `__init__.py`."""
 
+from estimators.orbit_target.parameters import AttitudeFrom as AttitudeFrom
 from missions.base.mission import Mission as Mission
 from missions.base.options import FlightOptions as FlightOptions
 from missions.base.options import MissionOptions as MissionOptions
@@ -22,7 +23,6 @@ from missions.multi_target.world import terrain_targets_world as terrain_targets
 from missions.occupancy.magnetic_target import MagneticTarget as MagneticTarget
 from missions.occupancy.options import OccupancyOptions as OccupancyOptions
 from missions.occupancy.world import occupancy_world as occupancy_world
-from missions.orbit.options import AttitudeFrom as AttitudeFrom
 from missions.orbit.options import OrbitOptions as OrbitOptions
 from missions.orbit.target_motion import TargetMotion as TargetMotion
 from missions.orbit.world import orbit_world as orbit_world

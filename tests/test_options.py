@@ -137,7 +137,7 @@ def test_missions_hold_the_parameters_of_estimators():
     holders = {
         name for name, kind in MISSIONS.items() for held in held_by(kind) if issubclass(held.kind, Options)
     }
-    assert {"handoff", "vision-search", "multi-target", "occupancy", "survey"} <= holders
+    assert {"orbit", "handoff", "vision-search", "multi-target", "occupancy", "survey"} <= holders
 
 
 @pytest.mark.parametrize("name", MISSIONS)

@@ -1,5 +1,5 @@
 """A target followed by line of sight from an aircraft that does not know its own position."""
 
-from estimators.orbit_target.estimator import OrbitTargetEstimate, OrbitTargetEstimator, OrbitTargetParameters
+from flightsim.foundation.lazy_exports import lazy_exports
 
-__all__ = ["OrbitTargetEstimate", "OrbitTargetEstimator", "OrbitTargetParameters"]
+__getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

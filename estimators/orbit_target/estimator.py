@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from statistics import fmean
-from typing import ClassVar, Final, Literal
+from typing import ClassVar, Final
 
 from autopilot_bridge.mavlink import MAVLinkMessage, dialect
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
@@ -20,56 +20,20 @@ from estimators.input_guard import InputGuard
 from estimators.interface import Estimator, Need, Outcome
 from estimators.messages import Message, is_a, on
 from estimators.orbit_target.attitude import ATTITUDE, AttitudeSource, AutopilotAttitude, FilterAttitude
-from estimators.orbit_target.tracker import TargetStatus, TargetTracker, TrackerParameters
+from estimators.orbit_target.parameters import PRESSURES_PA, OrbitTargetParameters
+from estimators.orbit_target.tracker import TargetStatus, TargetTracker
 from estimators.pressure_height import PressureHeight
 from estimators.tracking.line_of_sight import detection, gimbal_attitude
 from estimators.vehicle_time import UNIX_TIME_US
 from flightsim.foundation.atmosphere import air_density_ratio
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
-from flightsim.foundation.options import option
 
 _GROUND_SAMPLES: Final = 20
-_PRESSURES_PA: Final = (10_000.0, 120_000.0)
 _AIR_M_S: Final = 8.0
 """Standard deviation per axis of the velocity of an unknown target against the air: wind and its own
 motion.
 """
 _STATUSES: Final = tuple(TargetStatus)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class OrbitTargetParameters(TrackerParameters):
-    """Parameters of `OrbitTargetEstimator`."""
-
-    attitude: Literal["autopilot", "filter"] = option(
-        "autopilot", help="Source of roll and pitch: the autopilot, or the filter of attitude."
-    )
-    target_north_m: float | None = option(
-        None, varies="the first detection", help="Place north of home where the target is expected."
-    )
-    target_east_m: float | None = option(
-        None, varies="the first detection", help="Place east of home where the target is expected."
-    )
-    target_speed_m_s: float = option(0.0, help="Expected speed of the target.")
-    target_heading_rad: float = option(0.0, help="Direction in which the target is expected to move.")
-    target_sigma_m: float = option(
-        20.0, above=0.0, help="Standard deviation of the expected place (paper: 20 m)."
-    )
-    drift_sigma_m_s: float = option(
-        2.0, above=0.0, help="Standard deviation of the target's velocity relative to the air."
-    )
-    target_ground_m: float = option(0.0, help="Height of the target's ground above that of the start.")
-    ground_pa: float | None = option(
-        None,
-        above=_PRESSURES_PA[0],
-        below=_PRESSURES_PA[1],
-        varies="measured before it is armed",
-        help="Pressure on the ground.",
-    )
-
-    def check_together(self) -> None:
-        if (self.target_north_m is None) != (self.target_east_m is None):
-            raise ValueError("target_north_m and target_east_m make a place together; give both, or neither")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -240,7 +204,7 @@ class OrbitTargetEstimator(Estimator[OrbitTargetParameters]):
 
     def _pressure(self, time_us: int, message: wire.SCALED_PRESSURE) -> Outcome:
         static_pa = 100.0 * message.press_abs
-        if not _PRESSURES_PA[0] < static_pa < _PRESSURES_PA[1]:
+        if not PRESSURES_PA[0] < static_pa < PRESSURES_PA[1]:
             return Outcome.IMPLAUSIBLE
         self._static_pa = static_pa
         if self._height is None:

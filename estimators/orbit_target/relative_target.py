@@ -23,9 +23,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from estimators.orbit_target.parameters import RelativeTargetParameters
 from estimators.tracking.gaussian import Gaussian, Innovation
 from estimators.tracking.line_of_sight import LineOfSight
-from flightsim.foundation.options import Options, option
 
 Array = NDArray[np.float64]
 
@@ -35,24 +35,6 @@ SIZE: Final = 4
 
 _KEPT: Final = 256
 _LEAST_OFFSET_M: Final = 1.0
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RelativeTargetParameters(Options):
-    """Noise of the filter; standard deviations."""
-
-    angle_rad: float = option(
-        math.radians(0.5), above=0.0, help="Standard deviation of a line of sight: pixels, gimbal, attitude."
-    )
-    drift_acceleration_m_s2_per_root_hz: float = option(
-        0.7, above=0.0, help="Random walk of the target against the air: gusts, and a target that turns."
-    )
-    offset_rate_m_per_root_s: float = option(
-        0.3, above=0.0, help="Random walk of the offset: sideslip, compass, time stamps."
-    )
-    gate: float = option(
-        13.8, above=0.0, help="Largest normalized innovation squared of an accepted detection."
-    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

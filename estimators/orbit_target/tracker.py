@@ -6,12 +6,12 @@ Outputs are the relative target and the direction in which the gimbal must point
 
 import math
 from collections import deque
-from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final
 
 from estimators.orbit_target.attitude import AttitudeSource
-from estimators.orbit_target.relative_target import RelativeState, RelativeTarget, RelativeTargetParameters
+from estimators.orbit_target.parameters import TrackerParameters
+from estimators.orbit_target.relative_target import RelativeState, RelativeTarget
 from estimators.tracking.line_of_sight import (
     Detection,
     GimbalAttitude,
@@ -19,7 +19,6 @@ from estimators.tracking.line_of_sight import (
     line_of_sight_of_gimbal,
     pointing_angles,
 )
-from flightsim.foundation.options import option
 from flightsim.foundation.vectors import between, yaw_of
 
 _GIMBALS_KEPT: Final = 128
@@ -36,18 +35,6 @@ class TargetStatus(StrEnum):
     EXPECTED = "expected"  # not acquired yet: known only from another source
     SEEN = "seen"  # acquired by consecutive detections
     LOST = "lost"  # was acquired, but has not been detected for some time
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TrackerParameters(RelativeTargetParameters):
-    """Parameters of the tracker and of its filter."""
-
-    acquired_after: int = option(
-        3, least=1, help="Number of accepted detections in a row with which the target is acquired."
-    )
-    lost_after_s: float = option(
-        3.0, above=0.0, help="Time without an accepted detection after which an acquired target is lost."
-    )
 
 
 class TargetTracker:

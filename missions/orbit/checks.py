@@ -35,13 +35,13 @@ def check_vehicle(options: OrbitOptions, limits: Limits) -> None:
             f"the entry of the orbit may be {reach_m:.0f} m from home, more than {limits.reach_m:g} m; "
             "ask for a `target_ne_m` nearer to home, or a smaller `entry_distance_m`"
         )
-    least_m = limits.turn_radius_m(airspeed_m_s, drift_m_s=options.target_speed_m_s)
+    least_m = limits.turn_radius_m(airspeed_m_s, drift_m_s=options.estimator.target_speed_m_s)
     if options.radius_m < least_m:
         raise PlanError(
             f"an orbit of radius {options.radius_m:g} m can't be held: at {airspeed_m_s:g} m/s of "
             "airspeed, in "
             f"{limits.wind_m_s:.3g} m/s of wind and around a target that moves at "
-            f"{options.target_speed_m_s:g} m/s, "
+            f"{options.estimator.target_speed_m_s:g} m/s, "
             f"{math.degrees(limits.bank_max_rad):.0f} degrees of bank ({limits.bank_parameter}) make "
             "a circle of "
             f"{least_m:.0f} m or more; ask for `radius_m` {10.0 * math.ceil(0.1 * least_m):g}, or a "
@@ -49,8 +49,8 @@ def check_vehicle(options: OrbitOptions, limits: Limits) -> None:
         )
     if options.height_over_target_m <= 0.0:
         raise PlanError(
-            f"the target's ground, {options.target_ground_m:g} m above home, is not below the aircraft at "
-            f"{options.own_altitude_m:g} m; change `altitude_m`"
+            f"the target's ground, {options.estimator.target_ground_m:g} m above home, is not below the "
+            f"aircraft at {options.own_altitude_m:g} m; change `altitude_m`"
         )
     depression = math.atan2(options.height_over_target_m, options.radius_m)
     if depression < LEAST_DEPRESSION_RAD:
@@ -74,8 +74,8 @@ def check_camera(
     """
     true_m_s = limits.true_airspeed_m_s(airspeed_of(options, limits))
     depression = math.atan2(options.height_over_target_m, options.radius_m)
-    slower = max(5.0, true_m_s - limits.wind_m_s - options.target_speed_m_s)
-    faster = true_m_s + limits.wind_m_s + options.target_speed_m_s
+    slower = max(5.0, true_m_s - limits.wind_m_s - options.estimator.target_speed_m_s)
+    faster = true_m_s + limits.wind_m_s + options.estimator.target_speed_m_s
     for speed in (slower, faster):
         bank = math.atan(speed**2 / (GRAVITY_M_S2 * options.radius_m))
         elevation = bank - depression

@@ -142,7 +142,7 @@ class OrbitFlight:
                     f"the entry of the orbit was not reached within 600 s: still {off_m:.0f} m away; "
                     f"{vehicle.link.last_received()}"
                 )
-            elif options.target_speed_m_s and (self._now_us - placed_us) % 20_000_000 < 100_000:
+            elif options.estimator.target_speed_m_s and (self._now_us - placed_us) % 20_000_000 < 100_000:
                 await self._circle_for_entry(home, course, radius_m)  # the aircraft has moved on
 
     async def _circle_for_entry(self, home: GeodeticPosition, course: float, radius_m: float) -> None:

@@ -64,9 +64,9 @@ class OrbitMission(Mission[OrbitOptions]):
         return {
             "target_north_m": north_m,
             "target_east_m": east_m,
-            "target_speed_m_s": 0.0 if options.target_wanders else options.target_speed_m_s,
-            "target_heading_rad": options.target_heading_rad,
-            "target_ground_m": options.target_ground_m,
+            "target_speed_m_s": 0.0 if options.target_wanders else options.estimator.target_speed_m_s,
+            "target_heading_rad": options.estimator.target_heading_rad,
+            "target_ground_m": options.estimator.target_ground_m,
             **({"target_sigma_m": WANDERING_M} if options.target_wanders else {}),
         }
 
@@ -111,7 +111,11 @@ class OrbitMissionFlight(MissionFlight[OrbitOptions]):
 
 def _title(options: OrbitOptions) -> str:
     way = "clockwise" if options.direction > 0 else "counter-clockwise"
-    moving = f", target at {options.target_speed_m_s:g} m/s" if options.target_speed_m_s else ""
+    moving = (
+        f", target at {options.estimator.target_speed_m_s:g} m/s"
+        if options.estimator.target_speed_m_s
+        else ""
+    )
     return f"GPS-denied orbit, {options.radius_m:g} m {way}{moving}"
 
 

@@ -2,15 +2,18 @@
 
 import math
 from dataclasses import dataclass
-from enum import IntEnum, StrEnum
+from enum import IntEnum
 from typing import Final
 
-from flightsim.foundation.options import option, other_default
+from estimators.orbit_target.parameters import OrbitTargetParameters
+from flightsim.foundation.options import held, option, other_default
 from missions.base.options import MissionOptions
+from missions.errors import PlanError
 from missions.gps_off import GpsOff
 
 WANDERING_M: Final = 100.0
 """Largest distance of a wandering target from its place: radius of its circle, half the side of its area."""
+_FASTEST_M_S: Final = 15.0  # of a target on the ground
 
 
 class Direction(IntEnum):
@@ -18,14 +21,6 @@ class Direction(IntEnum):
 
     CW = 1
     CCW = -1
-
-
-class AttitudeFrom(StrEnum):
-    """The source of roll and pitch for the orbit."""
-
-    AUTOPILOT = "autopilot"
-    FILTER = "filter"
-    """Our own filter, fed with the aircraft's inertial sensors and airspeed."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,10 +44,7 @@ class OrbitOptions(MissionOptions):
         metavar="NORTH,EAST",
         help="Place of the target at the beginning, m from home, as reported before the flight.",
     )
-    target_speed_m_s: float = option(0.0, least=0.0, most=15.0, help="Speed of the target.")
-    target_heading_rad: float = option(0.0, help="Direction in which the target moves.")
     target_wanders: bool = False
-    target_ground_m: float = option(0.0, help="Height of the target's ground above home.")
     entry_bearing_rad: float = option(math.pi, help="Bearing from the target to the place where GPS is lost.")
     entry_distance_m: float = option(
         400.0, above=0.0, help="Distance from the target to the place where GPS is lost."
@@ -67,14 +59,23 @@ class OrbitOptions(MissionOptions):
     lost_limit_s: float = option(
         30.0, above=0.0, help="Time without the target after which the orbit is given up."
     )
-    attitude: AttitudeFrom = option(
-        AttitudeFrom.AUTOPILOT, help="Source of roll and pitch: the autopilot, or our own filter."
+    estimator: OrbitTargetParameters = held(
+        OrbitTargetParameters(),
+        target_speed="target_speed_m_s",
+        target_heading="target_heading_rad",
+        target_ground="target_ground_m",
+        attitude="attitude",
     )
+
+    def check_together(self) -> None:
+        speed_m_s = self.estimator.target_speed_m_s
+        if speed_m_s > _FASTEST_M_S:
+            raise PlanError(f"`target_speed_m_s` {speed_m_s:g} m/s is not in 0..{_FASTEST_M_S:g} m/s")
 
     @property
     def height_over_target_m(self) -> float:
         """Height of this vehicle over the target."""
-        return self.own_altitude_m - self.target_ground_m
+        return self.own_altitude_m - self.estimator.target_ground_m
 
     @property
     def entry_course_rad(self) -> float:

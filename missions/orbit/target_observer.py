@@ -2,18 +2,19 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Final
 
 from autopilot_bridge.mavlink import Frame
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT, CAMERA_COMPONENT, GIMBAL_COMPONENT
 from estimators.messages import read_message
-from estimators.orbit_target import OrbitTargetEstimator, OrbitTargetParameters
+from estimators.orbit_target import OrbitTargetEstimator
 from estimators.orbit_target.attitude import FilterAttitude
 from estimators.orbit_target.tracker import TargetStatus
 from estimators.vehicle_time import VehicleTime
 from flightsim.foundation.geodesy import LocalFrame
 from missions.errors import MissionError
-from missions.orbit.options import WANDERING_M, AttitudeFrom, OrbitOptions
+from missions.orbit.options import WANDERING_M, OrbitOptions
 from missions.vehicle import telemetry
 from missions.vehicle.attitude_pilot import AttitudePilot
 from missions.vehicle.vehicle import Vehicle
@@ -41,11 +42,11 @@ class TargetObserver:
         self._vehicle = vehicle
         self._options = options
         self._estimator = OrbitTargetEstimator(
-            OrbitTargetParameters(
-                attitude="filter" if options.attitude is AttitudeFrom.FILTER else "autopilot",
+            replace(
+                options.estimator,
                 target_north_m=options.target_ne_m[0],
                 target_east_m=options.target_ne_m[1],
-                target_sigma_m=WANDERING_M if options.target_wanders else _GIVEN_SIGMA_M,
+                **({"target_sigma_m": WANDERING_M} if options.target_wanders else {}),
             )
         )
         source = self._estimator.attitude
@@ -108,7 +109,7 @@ class TargetObserver:
         if not (math.isfinite(height_m) and math.isfinite(airspeed_m_s)):
             return
         now_us = vehicle.clock.stamp_us
-        tracker.height(height_m - self._options.target_ground_m)
+        tracker.height(height_m - self._options.estimator.target_ground_m)
         if self.with_gps and tracker.status is not TargetStatus.SEEN:
             self._use_given_place(now_us, airspeed_m_s)
         tracker.step(now_us, airspeed_m_s, pilot.climb_m_s)
@@ -148,9 +149,7 @@ class TargetObserver:
         o = self._options
         if o.target_wanders:  # its place is known only approximately
             return o.target_ne_m, (0.0, 0.0)
-        velocity = (
-            o.target_speed_m_s * math.cos(o.target_heading_rad),
-            o.target_speed_m_s * math.sin(o.target_heading_rad),
-        )
+        speed_m_s, heading_rad = o.estimator.target_speed_m_s, o.estimator.target_heading_rad
+        velocity = speed_m_s * math.cos(heading_rad), speed_m_s * math.sin(heading_rad)
         since_s = (time_us - self._vehicle.link.first_heartbeat_us) * 1e-6
         return (o.target_ne_m[0] + since_s * velocity[0], o.target_ne_m[1] + since_s * velocity[1]), velocity

@@ -31,7 +31,7 @@ def orbit_world(world: WorldSpec, options: OrbitOptions, target: TargetMotion | 
     Raises:
         PlanError: the motion does not go with the reported speed.
     """
-    speed_m_s, motion = options.target_speed_m_s, (target or TargetMotion()).kind
+    speed_m_s, motion = options.estimator.target_speed_m_s, (target or TargetMotion()).kind
     if motion is None:
         motion = MotionKind.STRAIGHT if speed_m_s > 0.0 else MotionKind.STATIC
     if motion is not MotionKind.STATIC and speed_m_s == 0.0:
@@ -46,7 +46,7 @@ def orbit_world(world: WorldSpec, options: OrbitOptions, target: TargetMotion | 
             motion,
             place_ne_m=options.target_ne_m,
             speed_m_s=speed_m_s,
-            course_rad=options.target_heading_rad,
+            course_rad=options.estimator.target_heading_rad,
             range_m=WANDERING_M,
         ),
         size_m=_tag_size_m(options),

@@ -8,12 +8,13 @@ import pytest
 from autopilot_bridge.mavlink import FrameEncoder, FrameParser, dialect
 from estimators.messages import read_message
 from estimators.orbit_target.attitude import FilterAttitude
+from estimators.orbit_target.parameters import AttitudeFrom, OrbitTargetParameters
 from estimators.vehicle_time import VehicleTime
 from flightsim.environment import Environment
 from flightsim.foundation.vectors import yaw_of
 from flightsim.world_spec import WorldSpec
 from missions.library import find_mission
-from missions.orbit.options import AttitudeFrom, OrbitOptions
+from missions.orbit.options import OrbitOptions
 from missions.orbit.world import orbit_world
 from missions.runs.session import RunRequest, fly
 
@@ -129,7 +130,7 @@ def test_names_are_what_must_be_listened_to():
 @pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
 def test_an_orbit_flown_with_it(tmp_path, autopilot):
     """The circle is held as with the autopilot's attitude."""
-    options = OrbitOptions(duration_s=120.0, attitude=AttitudeFrom.FILTER)
+    options = OrbitOptions(duration_s=120.0, estimator=OrbitTargetParameters(attitude=AttitudeFrom.FILTER))
     world = WorldSpec.of_team(
         model="aerosonde",
         autopilot=autopilot,

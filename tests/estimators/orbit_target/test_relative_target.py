@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from estimators.orbit_target.relative_target import RelativeTarget, RelativeTargetParameters
+from estimators.orbit_target.parameters import RelativeTargetParameters
+from estimators.orbit_target.relative_target import RelativeTarget
 from estimators.tracking.line_of_sight import LineOfSight
 
 HEIGHT = 100.0

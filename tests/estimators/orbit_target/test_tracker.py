@@ -6,7 +6,8 @@ import pytest
 
 from estimators.interface import Outcome
 from estimators.orbit_target.attitude import AutopilotAttitude
-from estimators.orbit_target.tracker import TargetStatus, TargetTracker, TrackerParameters
+from estimators.orbit_target.parameters import TrackerParameters
+from estimators.orbit_target.tracker import TargetStatus, TargetTracker
 from estimators.tracking.line_of_sight import Detection, GimbalAttitude
 from tests.missions.orbit.coordinated_turn import PointMass
 

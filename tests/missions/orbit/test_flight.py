@@ -18,13 +18,14 @@ from missions.library import find_mission
 from missions.orbit.options import OrbitOptions
 from missions.orbit.world import orbit_world
 from missions.runs.session import RunRequest, fly
+from tests.missions.held_options import with_fields
 from tests.slow import slow
 
 KEYS = {"radius_mean_error_percent", "radius_std_m", "altitude_error_m", "gps_lost_at_s"}
 
 
 def orbit(tmp_path, autopilot="px4", picture=False, name="run", seed=1, target=True, **changes):
-    options = OrbitOptions(**({"duration_s": 60.0} | changes))
+    options = with_fields(OrbitOptions(), **({"duration_s": 60.0} | changes))
     world = WorldSpec.of_team(
         model="aerosonde",
         autopilot=autopilot,

@@ -10,6 +10,7 @@ from missions.errors import PlanError
 from missions.orbit.checks import check_camera, check_vehicle
 from missions.orbit.options import OrbitOptions
 from missions.vehicle.limits import FixedWingLimits, MulticopterLimits
+from tests.missions.held_options import with_fields
 
 WINGS = FixedWingLimits(
     airspeed_min_m_s=18.0,
@@ -36,7 +37,7 @@ WINGS = FixedWingLimits(
 )
 def test_what_can_not_be_flown_is_refused(change, words):
     with pytest.raises(PlanError, match=words):
-        check_vehicle(OrbitOptions(**change), WINGS)
+        check_vehicle(with_fields(OrbitOptions(), **change), WINGS)
 
 
 def test_the_defaults_can_be_flown_and_hovering_is_no_orbit():
@@ -49,9 +50,9 @@ def test_the_smallest_radius_is_that_of_the_fastest_place_on_the_circle():
     """1.2 (V + w + v)^2 / (g tan(bank)), with true airspeed."""
     fastest = 25.0 * math.sqrt(1.225 / 1.15587) + 4.0 + 2.0  # density of ISO 2533 at 600 m
     least = 1.2 * fastest**2 / (9.80665 * math.tan(math.radians(45.0)))
-    check_vehicle(OrbitOptions(radius_m=least + 0.1, target_speed_m_s=2.0), WINGS)
+    check_vehicle(with_fields(OrbitOptions(), radius_m=least + 0.1, target_speed_m_s=2.0), WINGS)
     with pytest.raises(PlanError, match="can't be held"):
-        check_vehicle(OrbitOptions(radius_m=least - 0.1, target_speed_m_s=2.0), WINGS)
+        check_vehicle(with_fields(OrbitOptions(), radius_m=least - 0.1, target_speed_m_s=2.0), WINGS)
 
 
 def test_a_target_outside_what_the_gimbal_reaches_is_refused():
