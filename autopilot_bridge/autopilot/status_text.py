@@ -5,8 +5,8 @@ from typing import Final
 from autopilot_bridge.commander.events import Event
 from autopilot_bridge.dispatch import receives
 from autopilot_bridge.firmware.flavour import Flavour
-from autopilot_bridge.mavlink import dialect
-from autopilot_bridge.services.channel import Broadcast, Channel, MavlinkMessage, Source
+from autopilot_bridge.mavlink import MAVLinkMessage, dialect
+from autopilot_bridge.services.channel import Broadcast, Channel, Source
 from autopilot_bridge.services.microservice import Microservice
 
 CHUNK_BYTES: Final = 50
@@ -65,7 +65,7 @@ class StatusTextService(Microservice):
             or getattr(channel, "receives_all", False)  # a log
         )
 
-    def _messages(self, severity: int, text: str) -> list[MavlinkMessage]:
+    def _messages(self, severity: int, text: str) -> list[MAVLinkMessage]:
         """One message, or the chunks of a long text: id and chunk_seq as in MAVLink's STATUSTEXT."""
         data = text.encode("ascii", "replace")[: CHUNK_BYTES * _MAX_CHUNKS]
         if len(data) <= CHUNK_BYTES:

@@ -11,7 +11,7 @@ from autopilot_bridge.commander.modes import GUIDED_MODES, FlightMode
 from autopilot_bridge.commander.vehicle_tasks import Circle, GoAroundTask, TargetPosition
 from autopilot_bridge.commander.verdict import ACCEPTED, Reason, Verdict, failed
 from autopilot_bridge.flight.heading import Turn
-from autopilot_bridge.flight.task import FlightTask, SpeedKind, SpeedTask, Vector
+from autopilot_bridge.flight.task import AnyVector, FlightTask, SpeedKind, SpeedTask
 
 _DO_REPOSITION: Final = 192
 _MAX_DISTANCE_M: Final = 1e6
@@ -145,7 +145,7 @@ class Guidance:
     def go_to(
         self,
         guided: Any,
-        position_ned_m: Vector,
+        position_ned_m: AnyVector,
         *,
         yaw_rad: float = math.nan,
         yaw_rate_rad_s: float = math.nan,

@@ -74,7 +74,7 @@ class IdleTask:
 
 NAN3: Final = (math.nan, math.nan, math.nan)
 
-Vector = Array | tuple[float, float, float]
+AnyVector = Array | tuple[float, float, float]
 """Three components, local NED or body FRD."""
 
 

@@ -11,9 +11,6 @@ from typing import Final, NamedTuple, Protocol
 
 from autopilot_bridge.mavlink import MAVLinkMessage
 
-MavlinkMessage = MAVLinkMessage
-"""A message object of `pymavlink.dialects.v20.all` (pymavlink carries no types)."""
-
 Announce = Callable[[int, str], None]
 """Sends a STATUSTEXT: (MAV_SEVERITY, text)."""
 
@@ -28,7 +25,7 @@ class Channel(Protocol):
     @property
     def name(self) -> str: ...
 
-    def send(self, message: MavlinkMessage, /) -> None: ...
+    def send(self, message: MAVLinkMessage, /) -> None: ...
 
 
 class Broadcast(Protocol):
@@ -51,7 +48,7 @@ class _Nowhere:
 
     name = "nowhere"
 
-    def send(self, message: MavlinkMessage, /) -> None:
+    def send(self, message: MAVLinkMessage, /) -> None:
         """Drop the message."""
 
 
@@ -59,11 +56,11 @@ NO_CLIENT: Final = Source(channel=_Nowhere(), system_id=0, component_id=0)
 """The source of commands that the autopilot gives to itself."""
 
 
-Receiver = Callable[[MavlinkMessage, Source, int], None]
+Receiver = Callable[[MAVLinkMessage, Source, int], None]
 """Handles one received message: (message, source, time_us). Never raises because of its contents."""
 
 
-def send_to_all(broadcast: Broadcast, message: MavlinkMessage) -> None:
+def send_to_all(broadcast: Broadcast, message: MAVLinkMessage) -> None:
     """Send one message on every channel of the autopilot."""
     for channel in broadcast.channels:
         channel.send(message)
@@ -88,7 +85,7 @@ class AddressRule:
     component_ids: frozenset[int] | None
     any_system: bool
 
-    def accepts(self, message: MavlinkMessage) -> bool:
+    def accepts(self, message: MAVLinkMessage) -> bool:
         """True when the message is for this autopilot; a message without target fields is for all systems."""
         system = getattr(message, "target_system", None)
         if system is None:

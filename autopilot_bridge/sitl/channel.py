@@ -4,12 +4,19 @@ from collections.abc import Sequence
 from typing import Final
 
 from autopilot_bridge.links import Link, MemoryLink, PeerId
-from autopilot_bridge.mavlink import Frame, FrameEncoder, Intake, LinkSigning, Packet, ParserCounters
+from autopilot_bridge.mavlink import (
+    Frame,
+    FrameEncoder,
+    Intake,
+    LinkSigning,
+    MAVLinkMessage,
+    Packet,
+    ParserCounters,
+)
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from autopilot_bridge.mavlink.frame import SIGNATURE_SIZE
 from autopilot_bridge.mavlink.signing import is_unsigned_v2
 from autopilot_bridge.routing import LoopGuard, Router
-from autopilot_bridge.services.channel import MavlinkMessage
 from autopilot_bridge.telemetry.line import LineBudget
 from autopilot_bridge.telemetry.motion import MotionMessages
 
@@ -73,7 +80,7 @@ class LinkChannel:
         """Bytes of frames that are not complete yet."""
         return self._intake.pending_bytes
 
-    def send(self, message: MavlinkMessage) -> None:
+    def send(self, message: MAVLinkMessage) -> None:
         """Frame a message and send it."""
         self._send(self._encoder.encode(message))
 

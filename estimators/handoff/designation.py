@@ -22,8 +22,8 @@ from dataclasses import dataclass, field
 from estimators.handoff.appearance import Appearance, AppearanceParameters, Look, Looks
 from flightsim.foundation.checks import Positive, Share
 from flightsim.foundation.options import Options
+from flightsim.foundation.vectors import LevelVector
 
-Place = tuple[float, float]
 _NO_LOOKS: Mapping[int, Look] = {}
 _CERTAIN = 0.95  # the looks of a track that is the target with this probability are the target's
 
@@ -90,11 +90,11 @@ class _Living:
     """
 
     weight: float
-    place: Place
-    velocity: Place = (0.0, 0.0)
+    place: LevelVector
+    velocity: LevelVector = (0.0, 0.0)
     looks: Looks | None = None
     beside: dict[int, float] = field(default_factory=dict)
-    begun: tuple[int, Place] = (0, (0.0, 0.0))
+    begun: tuple[int, LevelVector] = (0, (0.0, 0.0))
     nearest: dict[int, float] = field(default_factory=dict)
 
 
@@ -114,8 +114,8 @@ class _Lost:
     weight: float
     exists: float
     since_us: int
-    place: Place
-    velocity: Place = (0.0, 0.0)
+    place: LevelVector
+    velocity: LevelVector = (0.0, 0.0)
     sigma_m_s: float
     counted: float = 1.0
 
@@ -147,7 +147,7 @@ class Designation:
         self,
         time_us: int,
         number: int,
-        place: Place,
+        place: LevelVector,
         sure: float = 1.0,
         doubles: frozenset[int] = frozenset(),
     ) -> None:
@@ -181,7 +181,7 @@ class Designation:
         self._seen_us = time_us
         self._choose()
 
-    def designate_place(self, time_us: int, place: Place, sure: float = 1.0) -> None:
+    def designate_place(self, time_us: int, place: LevelVector, sure: float = 1.0) -> None:
         """An operator designates a place at which there is no track yet: the next one near it is the target.
 
         Args:
@@ -201,7 +201,7 @@ class Designation:
         self._seen_us = time_us
         self._choose()
 
-    def _without_track(self, weight: float, time_us: int, place: Place) -> _Lost:
+    def _without_track(self, weight: float, time_us: int, place: LevelVector) -> _Lost:
         """A target that has had no track yet, somewhere near a place."""
         speed_m_s = self.parameters.speed_m_s
         return _Lost(weight=weight, exists=1.0, since_us=time_us, place=place, sigma_m_s=speed_m_s)
@@ -227,7 +227,7 @@ class Designation:
     def update(
         self,
         time_us: int,
-        places: Mapping[int, Place],
+        places: Mapping[int, LevelVector],
         looks: Mapping[int, Look] = _NO_LOOKS,
         doubtful: frozenset[int] = frozenset(),
     ) -> None:
@@ -258,7 +258,7 @@ class Designation:
             self._seen_us = time_us
 
     @property
-    def expected(self) -> Place | None:
+    def expected(self) -> LevelVector | None:
         """Where the target most probably is: its track, or where a lost one may have gone to; None: it was
         never designated, or was lost for too long.
         """
@@ -286,7 +286,7 @@ class Designation:
 
     # what changes the probabilities
 
-    def _lose(self, time_us: int, places: Mapping[int, Place]) -> None:
+    def _lose(self, time_us: int, places: Mapping[int, LevelVector]) -> None:
         """Tracks that have ended."""
         ended = [number for number in self._living if number not in places]
         if ended:
@@ -319,7 +319,7 @@ class Designation:
         moved = share * track.weight
         track.weight, other.weight = track.weight - moved, other.weight + moved
 
-    def _move(self, dt_s: float, places: Mapping[int, Place]) -> None:
+    def _move(self, dt_s: float, places: Mapping[int, LevelVector]) -> None:
         share = min(1.0, max(0.0, dt_s / 2.0))
         for number, track in self._living.items():
             x, y = places[number]
@@ -331,7 +331,7 @@ class Designation:
                 )
             track.place = (x, y)
 
-    def _begin(self, time_us: int, places: Mapping[int, Place]) -> None:
+    def _begin(self, time_us: int, places: Mapping[int, LevelVector]) -> None:
         """New tracks: of a target beside that of a living one, of a lost target, or of another."""
         p = self.parameters
         for number in sorted(places.keys() - self._living.keys()):
@@ -371,7 +371,7 @@ class Designation:
             lost.weight -= share * lost.weight
             lost.exists *= 1.0 - share
 
-    def _walked(self, lost: _Lost, time_us: int) -> tuple[Place, float]:
+    def _walked(self, lost: _Lost, time_us: int) -> tuple[LevelVector, float]:
         """Mean and variance per axis of the place of a lost target."""
         p = self.parameters
         age_s = (time_us - lost.since_us) * 1e-6
@@ -390,7 +390,7 @@ class Designation:
         age_s = max(0.0, (self._time_us - lost.since_us) * 1e-6)
         return p.unseen + (1.0 - p.unseen) * math.exp(-age_s / p.found_s)
 
-    def _density(self, lost: _Lost, time_us: int, place: Place) -> float:
+    def _density(self, lost: _Lost, time_us: int, place: LevelVector) -> float:
         p = self.parameters
         mean, variance = self._walked(lost, time_us)
         squared = ((place[0] - mean[0]) ** 2 + (place[1] - mean[1]) ** 2) / variance

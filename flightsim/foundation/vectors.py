@@ -15,6 +15,7 @@ Array = NDArray[np.float64]
 Angle = TypeVar("Angle", float, Array)
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
+LevelVector = tuple[float, float]
 ImagePoint = tuple[float, float]
 """Normalized image coordinates: to the right and down, over the distance along the optical axis."""
 

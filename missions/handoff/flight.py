@@ -11,6 +11,7 @@ from autopilot_bridge.mavlink import dialect
 from estimators.handoff import HandoffEstimator
 from estimators.orbit_target.relative_target import RelativeState
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
+from flightsim.foundation.vectors import LevelVector
 from missions.errors import MissionError
 from missions.handoff.camera import GIMBAL_HZ, GimbalPointing
 from missions.handoff.checks import check_vehicle
@@ -24,8 +25,6 @@ from missions.vehicle.roll_flight import follow_rolls
 from missions.vehicle.setpoint import AttitudeSetpoint
 from missions.vehicle.telemetry import Attitude, Position
 from missions.vehicle.vehicle import Vehicle
-
-Place = tuple[float, float]
 
 _RATES_HZ: Final = {"HIGHRES_IMU": 50.0, "RAW_IMU": 40.0, "SCALED_PRESSURE": 20.0, "GLOBAL_POSITION_INT": 5.0}
 _SEARCH_ROLL_RAD: Final = math.radians(15.0)  # of the circle that is flown until the pose is known
@@ -113,7 +112,7 @@ class HandoffAircraft(ABC):
             await vehicle.commands.set_message_rate(name, rate_hz)
         await vehicle.commands.request(dialect.MAVLink_home_position_message, 3.0)
 
-    def expected(self) -> Place | None:
+    def expected(self) -> LevelVector | None:
         """Forward and right of the reported place of the target, by GPS; None: not known."""
         p, attitude = self.vehicle.latest(Position), self.vehicle.latest(Attitude)
         if p is None or attitude is None or not self._with_gps:
@@ -123,7 +122,7 @@ class HandoffAircraft(ABC):
         c, s = math.cos(attitude.yaw_rad), math.sin(attitude.yaw_rad)
         return c * north + s * east, -s * north + c * east
 
-    def pointing(self) -> Place | None:
+    def pointing(self) -> LevelVector | None:
         """Forward and right of where the camera is pointed; None: nowhere."""
         return self.estimator.target() or self.expected()
 
@@ -152,7 +151,7 @@ class HandoffAircraft(ABC):
         if place is not None and math.isfinite(height_m):
             self._gimbal.point(place, height_m)
 
-    async def circle(self, place_ne_m: Place, radius_m: float, *, clockwise: bool) -> None:
+    async def circle(self, place_ne_m: LevelVector, radius_m: float, *, clockwise: bool) -> None:
         """Circle a place by GPS, without waiting."""
         vehicle, options = self.vehicle, self.options
         lat, lon, alt = LocalFrame(vehicle.home).geodetic_from_ned(*place_ne_m, -options.own_altitude_m)
@@ -174,7 +173,7 @@ class HandoffAircraft(ABC):
             look, what=what, on=("HEARTBEAT", "SCALED_PRESSURE"), timeout_s=timeout_s
         )
 
-    def away_m(self, place_ne_m: Place) -> float:
+    def away_m(self, place_ne_m: LevelVector) -> float:
         """Horizontal distance from a place, by GPS; infinite: not known."""
         p = self.vehicle.latest(Position)
         if p is None:
@@ -264,7 +263,7 @@ class TrackerFlight(HandoffAircraft):
         """Whether the tracker may go home, or a time has come."""
         return lambda: self.estimator.released or self.run.over or self.vehicle.clock.time_us >= until_us
 
-    def _target_ne_m(self) -> Place | None:
+    def _target_ne_m(self) -> LevelVector | None:
         """Place of the tracked target from home, by the aircraft's own position."""
         place, attitude = self.estimator.target(), self.vehicle.latest(Attitude)
         p = self.vehicle.latest(Position)
@@ -383,7 +382,7 @@ class TakeoverFlight(HandoffAircraft):
             roll_rad = self._guidance.command(state, 0.0, attitude.roll_rad).roll_rad
         return self.pilot.setpoint(vehicle.clock.time_us, roll_rad)
 
-    def _rate(self) -> Place:
+    def _rate(self) -> LevelVector:
         """Rate of the offset to the target in level axes: the velocity of its track, if there is one, less
         the aircraft's, both against the air.
         """

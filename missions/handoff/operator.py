@@ -5,8 +5,7 @@ from collections.abc import Callable, Mapping
 from typing import Final
 
 from estimators.handoff import Designation
-
-Place = tuple[float, float]
+from flightsim.foundation.vectors import LevelVector
 
 _APART_M: Final = 10.0  # two targets that are nearer to each other are not distinguished
 
@@ -29,7 +28,7 @@ class TrackOperator:
         self._designate = designate
         self._doubtful_us: int | None = None
 
-    def look(self, time_us: int, designation: Designation, places: Mapping[int, Place]) -> None:
+    def look(self, time_us: int, designation: Designation, places: Mapping[int, LevelVector]) -> None:
         """Look at the tracks of the newest frame.
 
         Args:

@@ -16,15 +16,15 @@ from estimators.handoff.process import TrackerReport
 from estimators.orbit_target.relative_target import RelativeState
 from estimators.relative_pose import LevelMotion
 from estimators.vision.ground_points import CameraAxes, on_ground
+from flightsim.foundation.vectors import LevelVector
 from missions.planning.orbit_guidance import OrbitGuidance
-from missions.studies.handoff_operator import Person, PersonParameters, slip
+from missions.studies.handoff_operator import Person, PersonParameters, Pixel, slip
 from missions.studies.handoff_world import FOCAL_PX, PERSON_M, HandoffWorld, targets_of
 from missions.studies.options import Operator
 
 __all__ = ["SEARCH_ROLL_RAD", "Tracker", "orbit_roll"]
 
 Array = NDArray[np.float64]
-Place = tuple[float, float]
 
 SEARCH_ROLL_RAD: Final = math.radians(15.0)
 """Of the circle that is flown while it is not known where the target is."""
@@ -102,7 +102,7 @@ class Tracker:
             self._pilot, world.time_us, self._aim(), world.ground_velocity(which), world.roll_rad(which)
         )
 
-    def _aim(self) -> Place:
+    def _aim(self) -> LevelVector:
         """Forward and right of the target's track, or of where it is expected."""
         if self._operator is Operator.WATCHES and self.designation.number is None:
             true = self._world.seen_from(HandoffWorld.TRACKER, self._world.targets)
@@ -112,7 +112,7 @@ class Tracker:
 
     # the operator as a person
 
-    def _ask_person(self, pointing: Place) -> None:
+    def _ask_person(self, pointing: LevelVector) -> None:
         world, designation, person = self._world, self.designation, self.person
         now_us = world.time_us
         doubtful = designation.number is None or designation.probability < _SURE
@@ -148,7 +148,7 @@ class Tracker:
         if number is not None:
             self._designate(places, number, clear=answer.clear)
 
-    def _in_picture(self, camera: CameraAxes) -> dict[int, Place]:
+    def _in_picture(self, camera: CameraAxes) -> dict[int, Pixel]:
         """Where the tracks are in the picture, from its middle, by number."""
         level = self.tracks.level()
         if not level:
@@ -161,7 +161,7 @@ class Tracker:
             if math.isfinite(x)
         }
 
-    def _clicked(self, camera: CameraAxes, point: Place) -> int | None:
+    def _clicked(self, camera: CameraAxes, point: Pixel) -> int | None:
         """The track at a point of the picture; without one, the point is where the next track will be."""
         height_m = self._world.setting.heights_m[HandoffWorld.TRACKER]
         directions = camera.directions(np.array([point]) / FOCAL_PX)
@@ -176,7 +176,7 @@ class Tracker:
         self.designation.designate_place(self._world.time_us, (x_m, y_m), 1.0 - self.person.parameters.lapse)
         return None
 
-    def _designate(self, places: dict[int, Place], number: int, *, clear: bool) -> None:
+    def _designate(self, places: dict[int, Pixel], number: int, *, clear: bool) -> None:
         """Designate the track that the person means.
 
         Args:
@@ -222,7 +222,7 @@ class Tracker:
 
 
 def orbit_roll(
-    pilot: OrbitGuidance, time_us: int, target: Place, velocity: tuple[float, float], roll_rad: float
+    pilot: OrbitGuidance, time_us: int, target: LevelVector, velocity: tuple[float, float], roll_rad: float
 ) -> float:
     """Roll of the orbit guidance; everything in the level frame, in which the heading is 0."""
     state = RelativeState(

@@ -10,10 +10,10 @@ import struct
 from collections.abc import Mapping
 from typing import Final
 
+from autopilot_bridge.mavlink import MAVLinkMessage
 from autopilot_bridge.mavlink.encoder import payload_packer
 from autopilot_bridge.mission_plan import MissionItem, MissionStore, MissionType
 from autopilot_bridge.mission_wire import item_message
-from autopilot_bridge.services.channel import MavlinkMessage
 from autopilot_bridge.storage.generated import Content, GeneratedStore
 
 _HEADER: Final = struct.Struct("<HHHHH")
@@ -38,6 +38,6 @@ def packed(items: tuple[MissionItem, ...], kind: MissionType) -> bytes:
     """The file of a plan."""
     data = bytearray(_HEADER.pack(_MAGIC, kind, 0, 0, len(items)))
     for seq, item in enumerate(items):
-        message: MavlinkMessage = item_message(item, seq, kind, target=(0, 0), current=False)
+        message: MAVLinkMessage = item_message(item, seq, kind, target=(0, 0), current=False)
         data += payload_packer(message.id)(message)
     return bytes(data)

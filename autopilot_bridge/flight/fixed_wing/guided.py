@@ -12,7 +12,7 @@ import numpy as np
 from autopilot_bridge.flight.context import Array, FlightContext
 from autopilot_bridge.flight.fixed_wing.base import AircraftTask
 from autopilot_bridge.flight.fixed_wing.loiter import LoiterTask
-from autopilot_bridge.flight.task import GuidedKind, SpeedKind, TaskStatus, Vector
+from autopilot_bridge.flight.task import AnyVector, GuidedKind, SpeedKind, TaskStatus
 from flightsim.foundation.atmosphere import GRAVITY_M_S2
 
 _NEVER: Final = math.inf
@@ -56,7 +56,7 @@ class GuidedTask(AircraftTask):
     def set_position(
         self,
         ctx: FlightContext,
-        position_ned_m: Vector,
+        position_ned_m: AnyVector,
         radius_m: float | None = None,
         airspeed_m_s: float | None = None,
     ) -> None:

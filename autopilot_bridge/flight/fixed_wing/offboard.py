@@ -10,7 +10,7 @@ from autopilot_bridge.flight.context import Array, FlightContext
 from autopilot_bridge.flight.fixed_wing.base import AircraftTask, GuidedPath
 from autopilot_bridge.flight.fixed_wing.circle import Circle
 from autopilot_bridge.flight.fixed_wing.loiter import LoiterTask
-from autopilot_bridge.flight.task import NAN3, OffboardKind, TaskStatus, Vector, clear_setpoint
+from autopilot_bridge.flight.task import NAN3, AnyVector, OffboardKind, TaskStatus, clear_setpoint
 from flightsim.foundation.rotations import euler_from_quaternion
 
 _STILL_M_S: Final = 0.5  # a slower velocity has no direction
@@ -46,9 +46,9 @@ class OffboardTask(AircraftTask):
 
     def set_trajectory(
         self,
-        position_ned_m: Vector = NAN3,
-        velocity_ned_m_s: Vector = NAN3,
-        acceleration_ned_m_s2: Vector = NAN3,
+        position_ned_m: AnyVector = NAN3,
+        velocity_ned_m_s: AnyVector = NAN3,
+        acceleration_ned_m_s2: AnyVector = NAN3,
         yaw_rad: float = math.nan,
         yaw_rate_rad_s: float = math.nan,
     ) -> None:
@@ -62,7 +62,7 @@ class OffboardTask(AircraftTask):
         self,
         q_ned_from_frd: Array | tuple[float, float, float, float],
         thrust: float,
-        rates_frd_rad_s: Vector = NAN3,
+        rates_frd_rad_s: AnyVector = NAN3,
     ) -> None:
         """New attitude setpoint with throttle 0..1. The aircraft flies its roll and pitch; rates and yaw
         follow from them."""
@@ -70,7 +70,7 @@ class OffboardTask(AircraftTask):
         self._throttle = min(1.0, max(0.0, thrust))
         self.kind = OffboardKind.ATTITUDE
 
-    def set_rates(self, rates_frd_rad_s: Vector, thrust: float) -> None:
+    def set_rates(self, rates_frd_rad_s: AnyVector, thrust: float) -> None:
         """New body-rate setpoint with throttle 0..1."""
         self._rates = _triple(rates_frd_rad_s)
         self._throttle = min(1.0, max(0.0, thrust))
@@ -187,5 +187,5 @@ class OffboardTask(AircraftTask):
         self._command.down_m = self._kept[1]
 
 
-def _triple(vector: Vector) -> tuple[float, float, float]:
+def _triple(vector: AnyVector) -> tuple[float, float, float]:
     return float(vector[0]), float(vector[1]), float(vector[2])

@@ -16,7 +16,7 @@ from autopilot_bridge.flight.multicopter.avoidance import limited_velocity
 from autopilot_bridge.flight.multicopter.hold import GotoTask, HoldTask
 from autopilot_bridge.flight.multicopter.motion import SmoothMotion
 from autopilot_bridge.flight.multicopter.takeoff import TakeoffRamp
-from autopilot_bridge.flight.task import NAN3, GuidedKind, SpeedKind, TaskStatus, Vector, clear_setpoint
+from autopilot_bridge.flight.task import NAN3, AnyVector, GuidedKind, SpeedKind, TaskStatus, clear_setpoint
 from autopilot_bridge.navigation import layout as nav_layout
 
 
@@ -55,7 +55,7 @@ class GuidedTask:
     def set_position(
         self,
         ctx: FlightContext,
-        position_ned_m: Vector,
+        position_ned_m: AnyVector,
         *,
         yaw_rad: float = math.nan,
         yaw_rate_rad_s: float = math.nan,
@@ -85,9 +85,9 @@ class GuidedTask:
     def set_velocity(
         self,
         ctx: FlightContext,
-        velocity_ned_m_s: Vector,
+        velocity_ned_m_s: AnyVector,
         *,
-        acceleration_ned_m_s2: Vector = NAN3,
+        acceleration_ned_m_s2: AnyVector = NAN3,
         yaw_rad: float = math.nan,
         yaw_rate_rad_s: float = math.nan,
     ) -> None:
@@ -102,7 +102,7 @@ class GuidedTask:
     def set_acceleration(
         self,
         ctx: FlightContext,
-        acceleration_ned_m_s2: Vector,
+        acceleration_ned_m_s2: AnyVector,
         *,
         yaw_rad: float = math.nan,
         yaw_rate_rad_s: float = math.nan,
@@ -117,10 +117,10 @@ class GuidedTask:
     def set_trajectory(
         self,
         ctx: FlightContext,
-        position_ned_m: Vector,
-        velocity_ned_m_s: Vector,
+        position_ned_m: AnyVector,
+        velocity_ned_m_s: AnyVector,
         *,
-        acceleration_ned_m_s2: Vector = NAN3,
+        acceleration_ned_m_s2: AnyVector = NAN3,
         yaw_rad: float = math.nan,
         yaw_rate_rad_s: float = math.nan,
     ) -> None:
@@ -138,7 +138,7 @@ class GuidedTask:
         ctx: FlightContext,
         q_ned_from_frd: Array | tuple[float, float, float, float],
         climb: float,
-        rates_frd_rad_s: Vector = NAN3,
+        rates_frd_rad_s: AnyVector = NAN3,
         *,
         yaw_rate_rad_s: float = math.nan,
     ) -> None:

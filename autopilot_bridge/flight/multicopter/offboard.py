@@ -9,7 +9,7 @@ from autopilot_bridge.control.multicopter import setpoint as sp
 from autopilot_bridge.flight.context import Array, FlightContext, FlightPhase
 from autopilot_bridge.flight.multicopter.hold import HoldTask
 from autopilot_bridge.flight.multicopter.takeoff import TakeoffRamp
-from autopilot_bridge.flight.task import NAN3, OffboardKind, TaskStatus, Vector, clear_setpoint
+from autopilot_bridge.flight.task import NAN3, AnyVector, OffboardKind, TaskStatus, clear_setpoint
 from autopilot_bridge.navigation import layout as nav_layout
 
 _WANTS_UP_M: Final = 0.2
@@ -34,9 +34,9 @@ class OffboardTask:
 
     def set_trajectory(
         self,
-        position_ned_m: Vector = NAN3,
-        velocity_ned_m_s: Vector = NAN3,
-        acceleration_ned_m_s2: Vector = NAN3,
+        position_ned_m: AnyVector = NAN3,
+        velocity_ned_m_s: AnyVector = NAN3,
+        acceleration_ned_m_s2: AnyVector = NAN3,
         yaw_rad: float = math.nan,
         yaw_rate_rad_s: float = math.nan,
     ) -> None:
@@ -53,7 +53,7 @@ class OffboardTask:
         self,
         q_ned_from_frd: Array | tuple[float, float, float, float],
         thrust: float,
-        rates_frd_rad_s: Vector = NAN3,
+        rates_frd_rad_s: AnyVector = NAN3,
     ) -> None:
         """Set a new attitude setpoint with collective thrust 0..1; finite rates are added as feed-forward."""
         clear_setpoint(self._latest, sp.ATTITUDE)
@@ -62,7 +62,7 @@ class OffboardTask:
         self._latest[sp.THRUST] = thrust
         self.kind = OffboardKind.ATTITUDE
 
-    def set_rates(self, rates_frd_rad_s: Vector, thrust: float) -> None:
+    def set_rates(self, rates_frd_rad_s: AnyVector, thrust: float) -> None:
         """Set a new body-rate setpoint with collective thrust 0..1."""
         clear_setpoint(self._latest, sp.RATES)
         self._latest[sp.RATES_FRD_RAD_S] = rates_frd_rad_s

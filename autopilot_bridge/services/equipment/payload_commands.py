@@ -17,11 +17,11 @@ from autopilot_bridge.commander.verdict import Result
 from autopilot_bridge.dispatch import command, receives
 from autopilot_bridge.flight.parameters import FlightParameters
 from autopilot_bridge.flight.region_of_interest import roi_of
-from autopilot_bridge.mavlink import dialect
+from autopilot_bridge.mavlink import MAVLinkMessage, dialect
 from autopilot_bridge.mavlink.components import CAMERA_COMPONENT, GIMBAL_COMPONENT
 from autopilot_bridge.mavlink.wire_units import e7
 from autopilot_bridge.mission_plan import MissionItem
-from autopilot_bridge.services.channel import MavlinkMessage, Source, send_to_all
+from autopilot_bridge.services.channel import Source, send_to_all
 from autopilot_bridge.services.commands.command import Command, Handler
 from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.services.parts import AutopilotParts
@@ -188,7 +188,7 @@ def _roi_item(command: Command, *, kinds: bool) -> MissionItem | None:
     )
 
 
-def forwarded(command: Command, system_id: int, component: int) -> MavlinkMessage:
+def forwarded(command: Command, system_id: int, component: int) -> MAVLinkMessage:
     """The message that forwards a command, in the form (LONG or INT) in which it came."""
     first = (command.p1, command.p2, command.p3, command.p4)
     if command.frame is None:

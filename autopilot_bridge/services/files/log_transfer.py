@@ -13,8 +13,8 @@ from dataclasses import dataclass, field
 from typing import Final, get_args
 
 from autopilot_bridge.dispatch import receives
-from autopilot_bridge.mavlink import dialect
-from autopilot_bridge.services.channel import MavlinkMessage, Source, is_congested
+from autopilot_bridge.mavlink import MAVLinkMessage, dialect
+from autopilot_bridge.services.channel import Source, is_congested
 from autopilot_bridge.services.files.log_book import LogBook, LogFile
 from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.storage import OpenFile, VehiclePath
@@ -47,7 +47,7 @@ class _Download:
 
     source: Source
     used_us: int
-    entries: deque[MavlinkMessage] = field(default_factory=deque)
+    entries: deque[MAVLinkMessage] = field(default_factory=deque)
     ranges: deque[tuple[int, int]] = field(default_factory=deque)
     number: int = -1
     file: OpenFile | None = None
@@ -197,7 +197,7 @@ class LogTransferService(Microservice):
             else:
                 return
 
-    def _next_data(self, download: _Download, file: OpenFile) -> MavlinkMessage:
+    def _next_data(self, download: _Download, file: OpenFile) -> MAVLinkMessage:
         offset, end = download.ranges.popleft()
         try:
             data = file.read(offset, max(0, min(DATA_BYTES, end - offset)))

@@ -9,10 +9,10 @@ from collections.abc import Callable, Sequence
 from typing import Final
 
 from autopilot_bridge.commander.events import Armed, Disarmed, Event
-from autopilot_bridge.mavlink import FrameEncoder, dialect
+from autopilot_bridge.mavlink import FrameEncoder, MAVLinkMessage, dialect
 from autopilot_bridge.packet_records import packet_records
 from autopilot_bridge.parameters import ParameterStore
-from autopilot_bridge.services.channel import Announce, MavlinkMessage
+from autopilot_bridge.services.channel import Announce
 from autopilot_bridge.services.files.card_layout import CardLayout, LogTimes
 from autopilot_bridge.services.files.log_book import LogBook
 from autopilot_bridge.services.microservice import Microservice
@@ -48,7 +48,7 @@ class LogChannel:
         self._encoder = FrameEncoder(system_id, 1)
         self._unix_us = unix_us
 
-    def send(self, message: MavlinkMessage) -> None:
+    def send(self, message: MAVLinkMessage) -> None:
         """Log a message."""
         self._keep(self._encoder.encode(message))
 

@@ -17,12 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot_bridge.dispatch import receives
-from autopilot_bridge.mavlink import dialect
+from autopilot_bridge.mavlink import MAVLinkMessage, dialect
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from autopilot_bridge.mavlink.wire_units import place
 from autopilot_bridge.navigation import external as external
 from autopilot_bridge.parameters import ParameterStore
-from autopilot_bridge.services.channel import MavlinkMessage, Receiver, Source, send_to_all
+from autopilot_bridge.services.channel import Receiver, Source, send_to_all
 from autopilot_bridge.services.inputs.timesync import in_vehicle_time
 from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.services.parts import AutopilotParts
@@ -106,7 +106,7 @@ class ExternalOdometryService(Microservice):
         """SET_GPS_GLOBAL_ORIGIN, and the messages with odometry that the firmware uses."""
         return {**super().receivers, **dict.fromkeys(self._policy.messages, self._on_sample)}
 
-    def _on_sample(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+    def _on_sample(self, message: MAVLinkMessage, source: Source, time_us: int) -> None:
         """Another vehicle's own ODOMETRY that arrives here is ignored."""
         if not self._policy.enabled(self._parameters):
             return
@@ -138,7 +138,7 @@ class ExternalOdometryService(Microservice):
 
     # messages
 
-    def _sample(self, message: MavlinkMessage, time_us: int) -> external.ExternalSample | None:
+    def _sample(self, message: MAVLinkMessage, time_us: int) -> external.ExternalSample | None:
         match message:
             case dialect.MAVLink_odometry_message():
                 return self._odometry(message, time_us)

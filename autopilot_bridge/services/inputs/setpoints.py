@@ -17,10 +17,9 @@ from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mavlink.wire_units import place
 from autopilot_bridge.navigation import layout as nav
 from flightsim.foundation.rotations import rotate
+from flightsim.foundation.vectors import Vector
 
-Triple = tuple[float, float, float]
-
-UNSET: Final[Triple] = (math.nan, math.nan, math.nan)
+UNSET: Final[Vector] = (math.nan, math.nan, math.nan)
 _MAX_POSITION_M: Final = 1e6
 _MAX_SPEED_M_S: Final = 1e3
 _MAX_ACCELERATION_M_S2: Final = 1e3
@@ -46,9 +45,9 @@ _MAX_RATE_RAD_S: Final = 100.0
 class Target(NamedTuple):
     """A setpoint in local NED; NaN: not controlled."""
 
-    position: Triple
-    velocity: Triple
-    acceleration: Triple
+    position: Vector
+    velocity: Vector
+    acceleration: Vector
     yaw_rad: float
     yaw_rate_rad_s: float
 
@@ -68,12 +67,12 @@ class Target(NamedTuple):
         return any_finite(self.acceleration)
 
 
-def any_finite(triple: Triple) -> bool:
+def any_finite(triple: Vector) -> bool:
     """At least one component is set."""
     return any(math.isfinite(value) for value in triple)
 
 
-def masked(values: Triple, bits: tuple[int, int, int], type_mask: int, limit: float) -> Triple:
+def masked(values: Vector, bits: tuple[int, int, int], type_mask: int, limit: float) -> Vector:
     """Components that the mask does not ignore; one that is not finite or too large counts as ignored."""
     x, y, z = (
         float(value) if not type_mask & bit and abs(value) <= limit else math.nan
@@ -82,17 +81,17 @@ def masked(values: Triple, bits: tuple[int, int, int], type_mask: int, limit: fl
     return x, y, z
 
 
-def position_of(values: Triple, type_mask: int) -> Triple:
+def position_of(values: Vector, type_mask: int) -> Vector:
     """Position components, m."""
     return masked(values, POSITION_BITS, type_mask, _MAX_POSITION_M)
 
 
-def velocity_of(values: Triple, type_mask: int) -> Triple:
+def velocity_of(values: Vector, type_mask: int) -> Vector:
     """Velocity components, m/s."""
     return masked(values, VELOCITY_BITS, type_mask, _MAX_SPEED_M_S)
 
 
-def acceleration_of(values: Triple, type_mask: int) -> Triple:
+def acceleration_of(values: Vector, type_mask: int) -> Vector:
     """Acceleration components, m/s^2."""
     return masked(values, ACCELERATION_BITS, type_mask, _MAX_ACCELERATION_M_S2)
 
@@ -106,7 +105,7 @@ def yaw_of(yaw_rad: float, yaw_rate_rad_s: float, type_mask: int) -> tuple[float
     return math.remainder(yaw, 2.0 * math.pi) if math.isfinite(yaw) else math.nan, rate
 
 
-def rotated_by_heading(values: Triple, heading_rad: float) -> Triple:
+def rotated_by_heading(values: Vector, heading_rad: float) -> Vector:
     """A vector given as forward, right, down, in NED. A single unset horizontal component is zero."""
     forward, right, down = values
     if not (math.isfinite(forward) or math.isfinite(right)):
@@ -117,7 +116,7 @@ def rotated_by_heading(values: Triple, heading_rad: float) -> Triple:
     return c * forward - s * right, s * forward + c * right, down
 
 
-def rotated_by_attitude(values: Triple, context: FlightContext) -> Triple:
+def rotated_by_attitude(values: Vector, context: FlightContext) -> Vector:
     """A vector given in body axes (FRD), in NED."""
     ned = np.empty(3)
     rotate(context.nav[nav.Q_NED_FROM_FRD], np.array(values), ned)
@@ -130,7 +129,7 @@ def heading_of(context: FlightContext) -> float:
     return float(context.nav[nav.EULER_RAD][2])
 
 
-def place_of(context: FlightContext) -> Triple:
+def place_of(context: FlightContext) -> Vector:
     """The vehicle's position, local NED."""
     north_m, east_m, down_m = (float(value) for value in context.nav[nav.POS_NED_M])
     return north_m, east_m, down_m
@@ -138,7 +137,7 @@ def place_of(context: FlightContext) -> Triple:
 
 def local_from_global(
     context: FlightContext, lat_e7: int, lon_e7: int, altitude_m: float, *, relative: bool
-) -> Triple | None:
+) -> Vector | None:
     """Local NED of a geodetic position; None when it is invalid, or the vehicle's own position is not known.
 
     Args:
@@ -166,12 +165,12 @@ def unit_quaternion(values: list[float], tolerance: float) -> np.ndarray | None:
     return q / length if abs(length - 1.0) <= tolerance else None
 
 
-def whole(values: Triple, bits: tuple[int, int, int], type_mask: int) -> Triple:
+def whole(values: Vector, bits: tuple[int, int, int], type_mask: int) -> Vector:
     """A vector that is used whole: not set when the mask has any of its bits."""
     return UNSET if any(type_mask & bit for bit in bits) else values
 
 
-def rates_of(message: dialect.MAVLink_set_attitude_target_message) -> Triple:
+def rates_of(message: dialect.MAVLink_set_attitude_target_message) -> Vector:
     """Body rates that are not ignored, rad/s; NaN for the others."""
     values = (message.body_roll_rate, message.body_pitch_rate, message.body_yaw_rate)
     roll, pitch, yaw = (

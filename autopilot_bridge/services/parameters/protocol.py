@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from autopilot_bridge.dispatch import receives
-from autopilot_bridge.mavlink import dialect
+from autopilot_bridge.mavlink import MAVLinkMessage, dialect
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from autopilot_bridge.parameters import (
     INTEGER_LIMITS,
@@ -22,14 +22,7 @@ from autopilot_bridge.parameters import (
     ParameterStore,
     ParameterType,
 )
-from autopilot_bridge.services.channel import (
-    Broadcast,
-    Channel,
-    MavlinkMessage,
-    Source,
-    is_congested,
-    send_to_all,
-)
+from autopilot_bridge.services.channel import Broadcast, Channel, Source, is_congested, send_to_all
 from autopilot_bridge.services.microservice import Microservice
 
 HASH_NAME: Final = "_HASH_CHECK"
@@ -247,7 +240,7 @@ class ParameterService(Microservice):
 
     def _value_message(
         self, definition: ParameterDefinition, *, index: int, name: str | None = None
-    ) -> MavlinkMessage:
+    ) -> MAVLinkMessage:
         value = self._store.get(definition.name)
         if self._policy.bytewise and definition.is_integer:
             value = _AS_FLOAT.unpack(_raw_int(value))[0]
@@ -259,7 +252,7 @@ class ParameterService(Microservice):
             index,
         )
 
-    def _hash_message(self) -> MavlinkMessage:
+    def _hash_message(self) -> MAVLinkMessage:
         value = _AS_FLOAT.unpack(_AS_UINT32.pack(self.hash_check))[0]
         return dialect.MAVLink_param_value_message(
             HASH_NAME.encode(), value, int(ParameterType.UINT32), self._store.count, NO_INDEX

@@ -12,12 +12,12 @@ from autopilot_bridge.commander.events import Event, ItemCommanded, ModeChanged
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.flight.plan_reading import is_waypoint
 from autopilot_bridge.flight.region_of_interest import ROI_COMMANDS
-from autopilot_bridge.mavlink import dialect
+from autopilot_bridge.mavlink import MAVLinkMessage, dialect
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT, CAMERA_COMPONENT, GIMBAL_COMPONENT
 from autopilot_bridge.mavlink.wire_units import e7
 from autopilot_bridge.mission_plan import MissionItem, MissionType
 from autopilot_bridge.mission_wire import TERRAIN_FRAMES, UNSET_INT, is_geodetic
-from autopilot_bridge.services.channel import MavlinkMessage, send_to_all
+from autopilot_bridge.services.channel import send_to_all
 from autopilot_bridge.services.commands.command import Command
 from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.services.parts import AutopilotParts
@@ -160,7 +160,7 @@ class MissionEquipment(Microservice):
 
     def _command(self, component: int, command: int, *parameters: float) -> None:
         values = (*parameters, *(0.0,) * (7 - len(parameters)))
-        message: MavlinkMessage = dialect.MAVLink_command_long_message(
+        message: MAVLinkMessage = dialect.MAVLink_command_long_message(
             self._parts.system_id, component, command, 0, *values
         )
         send_to_all(self._parts.broadcast, message)

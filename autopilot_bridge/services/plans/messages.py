@@ -14,7 +14,7 @@ from typing import ClassVar, Final
 from autopilot_bridge.mavlink import MAVLinkMessage, dialect
 from autopilot_bridge.mission_plan import MissionItem, MissionType
 from autopilot_bridge.mission_wire import item_message
-from autopilot_bridge.services.channel import Channel, MavlinkMessage, Source
+from autopilot_bridge.services.channel import Channel, Source
 
 _CRC_HEAD: Final = struct.Struct("<BHB4f")
 
@@ -60,7 +60,7 @@ _Current: Final = _with_extensions(
 )
 
 
-def send_extended(channel: Channel, message: MavlinkMessage) -> None:
+def send_extended(channel: Channel, message: MAVLinkMessage) -> None:
     """Send a message with its extension fields.
 
     An encoder based on pymavlink's definitions would leave them out, so the packed payload is passed to a
@@ -74,13 +74,13 @@ def send_extended(channel: Channel, message: MavlinkMessage) -> None:
         send_payload(type(message).id, payload)
 
 
-def extended_payload(message: MavlinkMessage) -> bytes | None:
+def extended_payload(message: MAVLinkMessage) -> bytes | None:
     """The payload of a message with its extension fields; None where pymavlink's definition has them."""
     wire_payload = getattr(message, "wire_payload", None)
     return None if wire_payload is None else wire_payload()
 
 
-def count_message(to: Source, count: int, mission_type: int, plan_id: int = 0) -> MavlinkMessage:
+def count_message(to: Source, count: int, mission_type: int, plan_id: int = 0) -> MAVLinkMessage:
     return _Count(
         target_system=to.system_id,
         target_component=to.component_id,
@@ -90,7 +90,7 @@ def count_message(to: Source, count: int, mission_type: int, plan_id: int = 0) -
     )
 
 
-def ack_message(to: Source, result: int, mission_type: int, plan_id: int = 0) -> MavlinkMessage:
+def ack_message(to: Source, result: int, mission_type: int, plan_id: int = 0) -> MAVLinkMessage:
     return _Ack(
         target_system=to.system_id,
         target_component=to.component_id,
@@ -102,7 +102,7 @@ def ack_message(to: Source, result: int, mission_type: int, plan_id: int = 0) ->
 
 def current_message(
     *, seq: int, total: int, state: int, mode: int, mission_id: int, fence_id: int, rally_id: int
-) -> MavlinkMessage:
+) -> MAVLinkMessage:
     return _Current(
         seq=seq,
         total=total,
@@ -114,7 +114,7 @@ def current_message(
     )
 
 
-def request_message(to: Source, seq: int, mission_type: int, *, as_int: bool) -> MavlinkMessage:
+def request_message(to: Source, seq: int, mission_type: int, *, as_int: bool) -> MAVLinkMessage:
     """MISSION_REQUEST_INT, or MISSION_REQUEST."""
     message = (
         dialect.MAVLink_mission_request_int_message if as_int else dialect.MAVLink_mission_request_message

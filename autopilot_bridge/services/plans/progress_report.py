@@ -3,9 +3,9 @@
 from collections.abc import Mapping
 from typing import Final, Protocol
 
-from autopilot_bridge.mavlink import dialect
+from autopilot_bridge.mavlink import MAVLinkMessage, dialect
 from autopilot_bridge.mission_plan import MissionStore, MissionType
-from autopilot_bridge.services.channel import Broadcast, MavlinkMessage, send_to_all
+from autopilot_bridge.services.channel import Broadcast, send_to_all
 from autopilot_bridge.services.plans.messages import current_message, send_extended
 from autopilot_bridge.services.plans.policy import MissionPolicy
 
@@ -56,7 +56,7 @@ class MissionReport:
         self._repeats_left = 0
         self._repeat_at_us = 0
 
-    def current_message(self) -> MavlinkMessage:
+    def current_message(self) -> MAVLinkMessage:
         """MISSION_CURRENT with the present state."""
         mission = self._mission
         count = len(mission.items)

@@ -10,11 +10,11 @@ from typing import NamedTuple, Protocol
 
 from autopilot_bridge.commander.events import Event, MissionItemReached
 from autopilot_bridge.dispatch import receives, streams
-from autopilot_bridge.mavlink import dialect
+from autopilot_bridge.mavlink import MAVLinkMessage, dialect
 from autopilot_bridge.mission_plan import MissionItem, MissionStore, MissionType
 from autopilot_bridge.mission_wire import item_from_message
 from autopilot_bridge.parameters import ParameterStore
-from autopilot_bridge.services.channel import Announce, Broadcast, MavlinkMessage, Source
+from autopilot_bridge.services.channel import Announce, Broadcast, Source
 from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.services.plans.download import MissionDownloads
 from autopilot_bridge.services.plans.messages import (
@@ -124,7 +124,7 @@ class MissionService(Microservice):
     def _current(self) -> bytes | None:
         return extended_payload(self.current_message())
 
-    def current_message(self) -> MavlinkMessage:
+    def current_message(self) -> MAVLinkMessage:
         """MISSION_CURRENT with the present state, for the streams."""
         return self._report.current_message()
 
