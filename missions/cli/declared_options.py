@@ -161,7 +161,10 @@ def made_of_values(kind: type[T], given: Given) -> T:
     Raises:
         click.UsageError, PlanError: a value is not accepted.
     """
-    chosen = {name for name, value in given.items() if value not in (None, (), False)}
+    # by identity: 0 is a value, though it is equal to False
+    chosen = {
+        name for name, value in given.items() if value is not None and value is not False and value != ()
+    }
     return made(kind, declared_options(kind), given, chosen)
 
 

@@ -46,7 +46,7 @@ class TargetObserver:
                 options.estimator,
                 target_north_m=options.target_ne_m[0],
                 target_east_m=options.target_ne_m[1],
-                **({"target_sigma_m": WANDERING_M} if options.target_wanders else {}),
+                target_sigma_m=WANDERING_M if options.target_wanders else options.estimator.target_sigma_m,
             )
         )
         source = self._estimator.attitude

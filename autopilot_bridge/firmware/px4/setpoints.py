@@ -13,6 +13,7 @@ from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.inputs import setpoints as wire
 from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.services.parts import AutopilotParts
+from flightsim.foundation.vectors import Vector
 
 _GLOBAL_FRAMES: Final = {dialect.MAV_FRAME_GLOBAL_INT: False, dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT: True}
 """Whether the altitude is over home."""
@@ -73,9 +74,9 @@ class Px4Setpoints(Microservice):
         self,
         message: dialect.MAVLink_set_position_target_local_ned_message
         | dialect.MAVLink_set_position_target_global_int_message,
-        position: wire.Triple,
-        velocity: wire.Triple,
-        acceleration: wire.Triple,
+        position: Vector,
+        velocity: Vector,
+        acceleration: Vector,
         time_us: int,
     ) -> None:
         target = wire.Target(

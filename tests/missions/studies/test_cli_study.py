@@ -59,10 +59,10 @@ def test_the_run_folder_has_summary_table_and_figures(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["--runs", "0"], "--runs"),
-        (["--runs", "many"], "'many' is not a valid integer"),
-        (["--workers", "0"], "--workers"),
-        (["--seed", "-1"], "--seed"),
+        (["--runs", "0"], "--runs 0 is not in 1..1000000"),
+        (["--runs", "many"], "'many' is not a whole number"),
+        (["--workers", "0"], "--workers 0 is not in 1..4096"),
+        (["--seed", "-1"], "--seed -1 is not possible"),
         (["--equations", "mine"], "'mine' is not one of 'corrected', 'printed', 'both'"),
     ],
 )

@@ -14,6 +14,7 @@ from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.inputs import setpoints as wire
 from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.services.parts import AutopilotParts
+from flightsim.foundation.vectors import Vector
 
 _GLOBAL_FRAMES: Final = {
     dialect.MAV_FRAME_GLOBAL_INT: False,
@@ -95,7 +96,7 @@ class ArduCopterSetpoints(Microservice):
         guided: GuidedTask,
         message: dialect.MAVLink_set_position_target_local_ned_message
         | dialect.MAVLink_set_position_target_global_int_message,
-    ) -> tuple[wire.Triple, wire.Triple] | None:
+    ) -> tuple[Vector, Vector] | None:
         """Velocity and acceleration; None: the message is not used further.
 
         A velocity that is no speed of a vehicle stops it, forces and an impossible acceleration are ignored.
@@ -170,9 +171,7 @@ class ArduCopterSetpoints(Microservice):
         return commander.guidance.guided()
 
 
-def _whole(
-    bits: wire.Triple | tuple[int, int, int], type_mask: int, values: wire.Triple
-) -> wire.Triple | None:
+def _whole(bits: Vector | tuple[int, int, int], type_mask: int, values: Vector) -> Vector | None:
     """A vector that is used whole: ignored when any of its bits is set; None when a component is invalid."""
     if any(type_mask & int(bit) for bit in bits):
         return wire.UNSET
