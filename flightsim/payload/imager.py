@@ -1,4 +1,4 @@
-"""What lens and sensor do to a picture beside its geometry: distortion, noise, rolling shutter."""
+"""What lens, sensor and link do to a picture: distortion, light, noise, rolling shutter, compression."""
 
 import math
 from dataclasses import dataclass, field, fields
@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from flightsim.foundation.checks import NotNegative, require_finite
+from flightsim.foundation.checks import NotNegative, Positive, Whole, require_finite
 from flightsim.foundation.kernels import kernel
 from flightsim.foundation.options import Options
 
@@ -86,12 +86,22 @@ class ImagerParameters(Options):
         read_noise: one sigma of each sample, in levels of 0 to 255.
         shot_noise: variance that grows with the light: levels^2 for each level.
         rolling_shutter_s: from the exposure of the first to that of the last row; 0: all rows at once.
+        vignetting: power of the natural falloff of light, cos^4 of the angle to the optical axis; 0: none.
+        brightness: light as a multiple of that of a right exposure; levels saturate at 255.
+        jpeg_quality: 1 to 100 of JPEG; 0: no compression.
     """
 
     distortion: BrownDistortion = field(default_factory=BrownDistortion)
     read_noise: NotNegative = 0.0
     shot_noise: NotNegative = 0.0
     rolling_shutter_s: NotNegative = 0.0
+    vignetting: NotNegative = 0.0
+    brightness: Positive = 1.0
+    jpeg_quality: Whole = 0
+
+    def check_together(self) -> None:
+        if self.jpeg_quality > 100:
+            raise ValueError(f"jpeg_quality {self.jpeg_quality} is not possible; 0 to 100 are")
 
     @property
     def noisy(self) -> bool:

@@ -1,4 +1,4 @@
-"""From an ideal picture to that of a lens and a sensor: motion blur, rolling shutter, distortion, noise.
+"""From an ideal picture to that of a camera: motion blur, rolling shutter, distortion, light, noise, JPEG.
 
 Motion is that of the camera over level ground: two pictures of a plane differ by a homography (Hartley and
 Zisserman 2004, section 13.1), so one rendered picture gives those of all moments of its exposure. What stands
@@ -17,6 +17,7 @@ from flightsim.foundation.rotations import multiply
 from flightsim.payload.camera_model import camera_from_gimbal
 from flightsim.payload.camera_view import CameraView
 from flightsim.payload.imager import ImagerParameters
+from flightsim.picture.levels import compressed, falloff, lit
 from flightsim.picture.pose import rotation_of
 from flightsim.picture.window import Window
 
@@ -57,18 +58,22 @@ class Exposure:
         self._sigma = np.array([imager.noise_sigma(level) for level in range(256)], np.float32)
         self._map: NDArray[np.float32] | None = None
         self.ideal_px = (width_px, height_px)
+        columns, rows = np.meshgrid(np.arange(width_px) + 0.5, np.arange(height_px) + 0.5)
+        rays = (np.stack((columns, rows), -1) - (0.5 * width_px, 0.5 * height_px)) / focal_px
         if not imager.distortion.none:
-            columns, rows = np.meshgrid(np.arange(width_px) + 0.5, np.arange(height_px) + 0.5)
-            seen = (np.stack((columns, rows), -1) - (0.5 * width_px, 0.5 * height_px)) / focal_px
-            rays = imager.distortion.rays(seen) * focal_px
+            rays = imager.distortion.rays(rays)
+        self._gain: NDArray[np.float32] | None = None
+        if imager.vignetting > 0.0 or imager.brightness != 1.0:
+            self._gain = np.float32(imager.brightness) * falloff(rays, imager.vignetting)
+        if not imager.distortion.none:
+            rays = rays * focal_px
             half = np.abs(rays).reshape(-1, 2).max(axis=0)
             ideal = [2 * (math.ceil(float(value)) + _EDGE_PX) for value in half]
             self.ideal_px = (ideal[0], ideal[1])
             # OpenCV counts from the middle of the first pixel
             self._map = (rays + (0.5 * np.array(ideal) - 0.5)).astype(np.float32)
         elif imager.rolling_shutter_s > 0.0:
-            columns, rows = np.meshgrid(np.arange(width_px), np.arange(height_px))
-            self._map = np.stack((columns, rows), -1).astype(np.float32)
+            self._map = np.stack((columns - 0.5, rows - 0.5), -1).astype(np.float32)
 
     def ideal_window(self, window: Window) -> Window:
         """The part of the ideal picture that a part of the finished one needs."""
@@ -103,7 +108,12 @@ class Exposure:
             picture = cv2.remap(
                 picture, columns, rows, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
             ).astype(np.uint8, copy=False)
-        return self._noisy(picture, view, window)
+        if self._gain is not None:
+            picture = lit(picture, self._gain[rows_of, columns_of])
+        picture = self._noisy(picture, view, window)
+        if self._imager.jpeg_quality > 0:
+            picture = compressed(picture, self._imager.jpeg_quality, (window.left, window.top))
+        return picture
 
     def _ground(self, view: CameraView, after_s: float) -> Array:
         """The ground's (north, east, 1) from pixels of the ideal picture, at a time after the view's."""

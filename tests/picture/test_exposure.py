@@ -110,6 +110,35 @@ def test_a_part_of_a_picture_is_the_same_as_in_the_whole():
     assert np.abs(off).max() <= 2 and (off != 0).mean() < 0.01
 
 
+def test_light_falls_off_by_the_angle_and_saturates():
+    """cos^4 of the angle of each pixel's ray, by the geometry of the model, times the brightness."""
+    clean = Renderer(SMALL).render(VIEW).astype(float)
+    dark = Renderer(SMALL, imager=ImagerParameters(vignetting=1.0)).render(VIEW)
+    for row, column in ((120, 160), (120, 310), (5, 5)):
+        off_px = math.hypot(column + 0.5 - 160.0, row + 0.5 - 120.0)
+        share = math.cos(math.atan(off_px / SMALL.focal_px)) ** 4
+        assert dark[row, column] == pytest.approx(share * clean[row, column], abs=1.0)
+    bright = Renderer(SMALL, imager=ImagerParameters(brightness=2.0)).render(VIEW)
+    assert bright == pytest.approx(np.minimum(2.0 * clean, 255.0), abs=1.0)
+
+
+def test_compression_loses_by_its_quality_and_in_the_blocks_of_the_whole_picture():
+    clean = Renderer(SMALL).render(VIEW).astype(float)
+    losses = []
+    for quality in (95, 50, 10):
+        renderer = Renderer(SMALL, imager=ImagerParameters(jpeg_quality=quality))
+        whole = renderer.render(VIEW)
+        losses.append(np.abs(whole - clean).mean())
+        window = Window(left=60, top=35, width=150, height=120)
+        part = renderer.render(VIEW, window=window)
+        inner = (slice(48, 144), slice(64, 208))  # whole blocks of 16 pixels
+        off = part[48 - 35 : 144 - 35, 64 - 60 : 208 - 60].astype(int) - whole[inner]
+        assert np.abs(off).mean() < 0.3 and (np.abs(off) > 8).mean() < 0.01
+    assert 0.0 < losses[0] < losses[1] < losses[2] < 20.0
+    with pytest.raises(ValueError, match="jpeg_quality 101"):
+        ImagerParameters(jpeg_quality=101)
+
+
 def test_the_ground_has_corners_to_track_at_every_height():
     for height_m in (10.0, 30.0, 90.0):
         view = replace(VIEW, eye_ned_m=(30.0, 20.0, -height_m), targets=())

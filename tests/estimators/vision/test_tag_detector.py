@@ -58,12 +58,12 @@ class Scene:
         )
 
 
-def examine(count, seed):
+def examine(count, seed, imager=IMAGER):
     """Rows: side px, detected, corner error px, reprojection px, relative place error, attitude error rad;
     and false tags.
     """
     rng = np.random.default_rng(seed)
-    renderer = Renderer(MODEL, imager=IMAGER, seed=seed)
+    renderer = Renderer(MODEL, imager=imager, seed=seed)
     rows, false = [], 0
     for number in range(count):
         scene = Scene(rng, number)
