@@ -68,7 +68,7 @@ class Flight:
         """Note how the vehicles are left now."""
         for vehicle in self.vehicles:
             if vehicle.link.identified:
-                vehicle.notes.left = vehicle.how_left()
+                vehicle.notes.left = vehicle.safe_exit.how_left()
 
     def require_log(self) -> None:
         """Make sure that all frames received so far are in the log.

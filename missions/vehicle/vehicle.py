@@ -2,34 +2,23 @@
 
 import asyncio
 import math
-from collections.abc import AsyncIterator, Callable, Coroutine, Mapping
+from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import asynccontextmanager, suppress
 from dataclasses import replace
-from typing import Any, Final, TypeVar
+from typing import Final, TypeVar
 
 from autopilot_bridge.clock import Clock
 from autopilot_bridge.mavlink import dialect
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
-from missions.errors import (
-    CommandRejected,
-    MissionError,
-    ModeNotEntered,
-    PlanError,
-    TakenOver,
-    VehicleTimeout,
-)
-from missions.how_left import Answer, HowLeft, SafetyCommand
+from missions.errors import MissionError, PlanError
 from missions.kind import VehicleKind
 from missions.vehicle.adapters import Adapter, ArduPilot, Px4
-from missions.vehicle.command_authority import HEARTBEATS_UNEXPLAINED, Command
 from missions.vehicle.commands import ACK_S, VehicleCommands
-from missions.vehicle.concurrency import run_to_end
 from missions.vehicle.connection import Connection
 from missions.vehicle.firmware import Firmware, Mode
 from missions.vehicle.guided import GuidedSession, LocalOrigin, SetpointSource, guided_session
 from missions.vehicle.limits import FORECAST_WIND_M_S, FixedWingLimits, Limits
 from missions.vehicle.link import VehicleLink
-from missions.vehicle.link_watch import QUIET_AFTER_S
 from missions.vehicle.notes import FlightNotes
 from missions.vehicle.parameters import VehicleParameters
 from missions.vehicle.payload import Payload
@@ -37,13 +26,13 @@ from missions.vehicle.plans import VehiclePlans
 from missions.vehicle.point_flight import PointFlight
 from missions.vehicle.readiness import Readiness
 from missions.vehicle.returning import ReturnEnd
+from missions.vehicle.safe_exit import SafeExit
 from missions.vehicle.sensors import SensorWatch
 from missions.vehicle.telemetry import Position
 from missions.vehicle.wing import FixedWing
 
 T = TypeVar("T")
 
-_FRESH_S: Final = 1.5  # heartbeats come once a second
 
 _ADAPTERS: Final[Mapping[str, Callable[[VehicleCommands, VehicleParameters], Adapter]]] = {
     "px4": Px4,
@@ -68,6 +57,7 @@ class Vehicle:
         plans: its stored mission, geofence and rally points, and the progress of the mission.
         payload: camera, gimbal and survey magnetometer.
         return_end: whether its returns end on the ground, and the wait for their end.
+        safe_exit: leaves it safe, and says how it was left.
         sensors: the sensors that the present mission needs, and whether they work.
         local_origin: origin of the autopilot's local frame.
         forecast_wind_m_s: wind that turns are planned for: the user's forecast, not the measured wind.
@@ -80,13 +70,13 @@ class Vehicle:
         self.plans = VehiclePlans(self.link, self.parameters, self.commands.heights)
         self.payload = Payload(self.link)
         self.return_end = ReturnEnd(self.link, self.parameters)
+        self.safe_exit = SafeExit(self.link, self.commands)
         self.sensors = SensorWatch(self.link)
         self.forecast_wind_m_s: float = FORECAST_WIND_M_S
         self.local_origin = LocalOrigin(self.commands)
         self._adapter: Adapter | None = None
         self._wing: FixedWing | None = None
         self._resuming: asyncio.Task[None] | None = None
-        self._left_safe_at = -1  # the number of commands when it was last left safe
         self.link.on_regained = self._resume_streams
 
     # parts that depend on the firmware and on the class of vehicle
@@ -416,140 +406,5 @@ class Vehicle:
             action: `Mode.RETURN` (the vehicle then lands by itself), `Mode.LAND` or `Mode.HOLD`. If it is
                 refused, the other two are tried.
         """
-        before, self.commands.until_safe = self.commands.until_safe, []
-        try:
-            async with self.link.until_taken_over():
-                yield self
-        except BaseException as error:
-            await run_to_end(self._make_safe(action))
-            taken = self.link.taken_over()
-            # the mode explains an error that preceded its heartbeat, but not one that was acted on before
-            acted = isinstance(error, TakenOver) or self.notes.safety_commands
-            if taken is not None and isinstance(error, MissionError) and not acted:
-                raise taken from error
-            raise
-        finally:
-            for end in self.commands.until_safe:
-                await end()
-            self.commands.until_safe = before
-
-    async def _make_safe(self, action: Mode) -> None:
-        """Command the action, unless another one has the vehicle or it is disarmed."""
-        link = self.link
-        # Heartbeats come once a second: after arming, the newest heartbeat may still report disarmed.
-        if not link.identified or not self.commands.may_be_armed or self._left_safe:
-            return
-        # What failed may be the effect of a mode that was not reported yet, or that is not explained.
-        await self._next_heartbeat(_FRESH_S)
-        for _ in range(HEARTBEATS_UNEXPLAINED):
-            if link.authority.state is Command.UNEXPLAINED:
-                await self._next_heartbeat(_FRESH_S)
-        withheld = self._withheld()
-        if not withheld:
-            with suppress(TakenOver):
-                await self._command_safe(action)
-            withheld = self._withheld()
-        if link.taken_over() is not None:
-            await self._next_heartbeat(_FRESH_S)  # for the autopilot's texts about it
-            withheld = self._withheld()
-        self.notes.withheld = withheld
-        self._left_safe_at = link.authority.commands
-
-    @property
-    def _left_safe(self) -> bool:
-        """Whether a block inside this one has left the vehicle safe, and nothing was commanded since."""
-        commands = self.notes.safety_commands
-        refused = bool(commands) and commands[-1].answer is Answer.REFUSED
-        return self._left_safe_at == self.link.authority.commands and not refused
-
-    def _withheld(self) -> str:
-        """Why nothing is commanded; "": there is no reason against it."""
-        authority = self.link.authority
-        if authority.take_over is not None:
-            return f"{authority.take_over.holder} has it"
-        if authority.failsafe_acts:
-            return "a failsafe has it"
-        if not authority.engaged:
-            return "this program had not armed or commanded it"
-        if authority.state is not Command.OURS:
-            return f"this program had not commanded mode {self.link.mode}"
-        return ""
-
-    async def _next_heartbeat(self, timeout_s: float) -> None:
-        """Wait for a heartbeat, but not for that of a lost link."""
-        if self.link.quiet:
-            return
-        before_us = self.link.heartbeat_us
-        received = asyncio.Event()
-        stop = self.link.connection.listen("HEARTBEAT", lambda _: received.set())
-        try:
-            async with self.clock.timeout(timeout_s):
-                while self.link.heartbeat_us == before_us:
-                    await received.wait()
-                    received.clear()
-        except TimeoutError:
-            return
-        finally:
-            stop()
-
-    async def _command_safe(self, action: Mode) -> None:
-        if self.link.landed_state == dialect.MAV_LANDED_STATE_ON_GROUND:
-            await self._answer("disarm", self._disarm_once())  # refused if it has just left the ground
-        # also for a disarmed vehicle: in the mission's mode it would fly off when it is armed again
-        for mode in (action, *(m for m in (Mode.RETURN, Mode.LAND, Mode.HOLD) if m is not action)):
-            if self.link.authority.state is not Command.OURS:
-                return  # nothing would be sent
-            answer = await self._answer(mode, self.commands.set_mode(mode, 5.0))
-            # A vehicle that is not received may still receive: it keeps the first action commanded.
-            if answer is Answer.DONE or self.link.quiet:
-                return
-
-    async def _disarm_once(self) -> None:
-        """Disarm and wait for it in a heartbeat; a refusal is no reason to wait for its cause."""
-        command = dialect.MAV_CMD_COMPONENT_ARM_DISARM
-        self.commands.require(command, await self.try_command(command, 0.0, timeout_s=0.5))
-        try:
-            await self.link.wait_disarmed(_FRESH_S)
-        except VehicleTimeout as error:
-            raise ModeNotEntered(str(error), acknowledged=True) from error
-
-    async def _answer(self, action: str, commanding: Coroutine[Any, Any, None]) -> Answer:
-        """Await the answer to a command that leaves the vehicle safe, and note both.
-
-        Raises:
-            TakenOver: another one has the vehicle.
-        """
-        commands = self.notes.safety_commands
-        commands.append(SafetyCommand(action=str(action), answer=Answer.NONE))
-        answer = Answer.DONE
-        try:
-            await commanding
-        except TakenOver:
-            raise
-        except CommandRejected:
-            answer = Answer.REFUSED
-        except ModeNotEntered as error:
-            answer = Answer.ACCEPTED if error.acknowledged else Answer.NONE
-        except MissionError:
-            answer = Answer.NONE
-        commands[-1] = replace(commands[-1], answer=answer)
-        return answer
-
-    def how_left(self) -> HowLeft:
-        """How the vehicle is left now: what was commanded to leave it safe, the answers, and its state."""
-        link, notes = self.link, self.notes
-        if not link.identified or link.heartbeat_us is None:
-            return HowLeft(system_id=notes.system_id)
-        position, landed = self.latest(Position), link.landed_state
-        silent_s = (link.clock.time_us - link.heartbeat_us) * 1e-6
-        return HowLeft(
-            system_id=link.system_id,
-            commands=tuple(notes.safety_commands),
-            withheld=notes.withheld,
-            mode=link.mode,
-            armed=link.armed,
-            on_ground=landed == dialect.MAV_LANDED_STATE_ON_GROUND if landed else None,
-            height_m=None if position is None else position.height_m,
-            height_older_s=0.0 if position is None else link.older_s(position.time_us),
-            silent_s=silent_s if silent_s > QUIET_AFTER_S else 0.0,
-        )
+        async with self.safe_exit.guard(action):
+            yield self

@@ -317,10 +317,10 @@ def test_after_a_refusal_the_outer_block_tries_again(flown):
 def test_a_height_that_is_older_than_the_heartbeats_is_stated_with_its_age(flown):
     async def script(vehicle, autopilot):
         await vehicle.takeoff(8.0)
-        assert vehicle.how_left().height_older_s == 0.0
+        assert vehicle.safe_exit.how_left().height_older_s == 0.0
         autopilot.streams.pop("GLOBAL_POSITION_INT")
         await vehicle.clock.sleep(8.0)
-        return vehicle.how_left().text, vehicle.link.last_received(), str(watched(vehicle))
+        return vehicle.safe_exit.how_left().text, vehicle.link.last_received(), str(watched(vehicle))
 
     left, received, state = flown(script)
     age = r" \((7|8) s before\)"
@@ -577,7 +577,7 @@ def test_a_heartbeat_before_the_first_time_stamp_is_no_silence_as_long_as_the_ve
             dialect.MAVLink_attitude_message(190_000, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
         ):
             ours.send(encoder.encode(message))
-        seen = vehicle.link.last_received(), watched(vehicle).silent_s, vehicle.how_left().silent_s
+        seen = vehicle.link.last_received(), watched(vehicle).silent_s, vehicle.safe_exit.how_left().silent_s
         await connection.close()
         return seen
 
