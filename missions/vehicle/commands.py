@@ -9,7 +9,8 @@ from missions.errors import CommandRejected, MissionError, ModeNotEntered, Vehic
 from missions.vehicle.connection import MessageStream
 from missions.vehicle.firmware import Mode, ModeCommand
 from missions.vehicle.heights import HeightRule
-from missions.vehicle.link import VehicleLink, describe_ack
+from missions.vehicle.link import VehicleLink
+from missions.vehicle.received_messages import describe_ack
 
 MessageT = TypeVar("MessageT", bound=MAVLinkMessage)
 

@@ -9,8 +9,8 @@ from missions.vehicle.adapters import PREARM, Adapter
 from missions.vehicle.arming_reasons import not_ready_because
 from missions.vehicle.commands import VehicleCommands
 from missions.vehicle.firmware import Mode
-from missions.vehicle.link import IN_THE_AIR
 from missions.vehicle.plans import VehiclePlans
+from missions.vehicle.received_messages import IN_THE_AIR
 
 # at the end of a wait for readiness: time in which the autopilot reports what is missing
 _REASONS_S: Final = 5.0
