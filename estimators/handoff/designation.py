@@ -8,7 +8,8 @@ managing multi-target identities in wireless ad-hoc sensor networks"). It change
   tracks shows it. The probabilities of both are mixed, the more the closer they came. When one of them ends
   there, both may have been of one target: the other one is of either;
 * a track is lost: its probability goes to the place where its target may be, which widens as the target walks
-  on, and from there to a new track that begins near it;
+  on, and from there to a new track that begins near it. A track that was hardly measured at its end has left
+  its target before, at the place where it was measured last;
 * a lost target stays without a track, although one in view soon has one;
 * a new track begins beside a living one: a tracker often has two tracks of one target for a second, but it
   may be of a lost one, which shows when they part;
@@ -16,6 +17,7 @@ managing multi-target identities in wireless ad-hoc sensor networks"). It change
 """
 
 import math
+from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -25,6 +27,7 @@ from flightsim.foundation.options import Options
 from flightsim.foundation.vectors import LevelVector
 
 _NO_LOOKS: Mapping[int, Look] = {}
+_MEASURED_US = 1_000_000
 _CERTAIN = 0.95  # the looks of a track that is the target with this probability are the target's
 
 
@@ -75,6 +78,9 @@ class DesignationParameters(Options):
     alone_m: Positive = 6.0
 
 
+_State = tuple[int, LevelVector, LevelVector]
+
+
 @dataclass(slots=True, kw_only=True)
 class _Living:
     """A track.
@@ -86,6 +92,8 @@ class _Living:
         beside: living tracks beside which it began, and from which it has not been away, with the probability
             that both are of one target.
         begun: time and place of its beginning.
+        doubtful: it has been measured seldom lately.
+        measured: times, places and velocities while it was measured often, a second apart: the newest two.
         nearest: least distance of other tracks in the present encounter, by number.
     """
 
@@ -95,6 +103,8 @@ class _Living:
     looks: Looks | None = None
     beside: dict[int, float] = field(default_factory=dict)
     begun: tuple[int, LevelVector] = (0, (0.0, 0.0))
+    doubtful: bool = False
+    measured: deque[_State] = field(default_factory=lambda: deque(maxlen=2))
     nearest: dict[int, float] = field(default_factory=dict)
 
 
@@ -242,7 +252,7 @@ class Designation:
         dt_s = (time_us - self._time_us) * 1e-6
         self._time_us = time_us
         self._lose(time_us, places)
-        self._move(dt_s, places)
+        self._move(time_us, dt_s, places, doubtful)
         self._begin(time_us, places)
         self._meet(doubtful)
         p = self.parameters
@@ -302,16 +312,23 @@ class Designation:
                     away = math.dist(track.place, other.place) / self.parameters.merged_m
                     _exchange(track, other, 0.5 * math.exp(-0.5 * away * away))
                 other.nearest.pop(number, None)
+            # a track that was hardly measured has left its target before, which may have another one already
+            since_us, place, velocity = time_us, track.place, track.velocity
+            if track.doubtful and track.measured:
+                since_us, place, velocity = track.measured[0]
             self._lost.append(
                 _Lost(
                     weight=track.weight,
                     exists=1.0,
-                    since_us=time_us,
-                    place=track.place,
-                    velocity=track.velocity,
+                    since_us=since_us,
+                    place=place,
+                    velocity=velocity,
                     sigma_m_s=self.parameters.lost_sigma_m_s,
                 )
             )
+            for k, other in self._living.items():
+                if other.begun[0] >= since_us and not other.beside:
+                    self._claim(k, 1.0, self._lost[-1])
 
     @staticmethod
     def _give(track: _Living, other: _Living, share: float) -> None:
@@ -319,7 +336,9 @@ class Designation:
         moved = share * track.weight
         track.weight, other.weight = track.weight - moved, other.weight + moved
 
-    def _move(self, dt_s: float, places: Mapping[int, LevelVector]) -> None:
+    def _move(
+        self, time_us: int, dt_s: float, places: Mapping[int, LevelVector], doubtful: frozenset[int]
+    ) -> None:
         share = min(1.0, max(0.0, dt_s / 2.0))
         for number, track in self._living.items():
             x, y = places[number]
@@ -330,6 +349,9 @@ class Designation:
                     v + share * ((y - track.place[1]) / dt_s - v),
                 )
             track.place = (x, y)
+            track.doubtful = number in doubtful
+            if not track.doubtful and (not track.measured or time_us - track.measured[-1][0] >= _MEASURED_US):
+                track.measured.append((time_us, track.place, track.velocity))
 
     def _begin(self, time_us: int, places: Mapping[int, LevelVector]) -> None:
         """New tracks: of a target beside that of a living one, of a lost target, or of another."""
@@ -355,17 +377,20 @@ class Designation:
             for lost in self._lost
         ]
 
-    def _claim(self, number: int, real: float) -> None:
+    def _claim(self, number: int, real: float, of: _Lost | None = None) -> None:
         """A track is of a lost target, or of another one that had no track.
 
         Args:
             number: of the track.
             real: probability that it is not of the same target as another track.
+            of: the lost target that it may be; None: any of them.
         """
         track = self._living[number]
         densities = self._densities(track)
         every = sum(densities) + self.parameters.untracked / self.parameters.area_m2
         for lost, density in zip(self._lost, densities, strict=True):
+            if of is not None and lost is not of:
+                continue
             share = real * density / every
             track.weight += share * lost.weight
             lost.weight -= share * lost.weight

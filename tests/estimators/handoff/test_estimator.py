@@ -222,6 +222,21 @@ def test_tracks_that_end_on_one_target_leave_it_open_whose_the_other_one_is():
     assert shares[3] > 0.3 and shares[1] + shares[3] > 0.95
 
 
+def test_the_target_of_a_track_that_was_drawn_away_is_where_it_was_measured_last():
+    """Its next track begins there, while the old one still is on its way."""
+    designation = Designation()
+    designation.designate(0, 1, (0.0, 0.0))
+    for k in range(1, 61):
+        away_m = max(0.0, 1.2 * (k - 40))
+        places = {1: (away_m, 0.0), 2: (60.0, 0.0)}
+        if k > 55:
+            places[3] = (1.0, 0.0)
+        designation.update(100_000 * k, places, doubtful=frozenset({1} if k > 45 else ()))
+    assert designation.number == 1
+    designation.update(6_100_000, {2: (60.0, 0.0), 3: (1.0, 0.0)})
+    assert designation.number == 3 and 0.95 < designation.probability < 1.0
+
+
 def test_looks_are_counted_once_whatever_other_tracks_do():
     """Looks of a target in another light, and tracks far away that begin and end."""
 
