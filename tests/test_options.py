@@ -2,21 +2,36 @@
 
 import re
 from dataclasses import fields
+from inspect import signature
 from itertools import pairwise
 from pathlib import Path
+from typing import get_args
 
 import click
 import pytest
 
+from autopilot_bridge.sitl import SigningParameters, UnsignedFrom
 from estimators.library import estimator_class
+from estimators.logs.mutate import mutated_records
 from estimators.names import ESTIMATORS
+from flightsim.airframe import LaunchKind
+from flightsim.environment import Turbulence
 from flightsim.foundation.options import Declared, Options, declared
 from flightsim.foundation.user_options import user_options
+from flightsim.sensors import RECEIVERS
+from flightsim.wind_profile import WindLaw
+from flightsim.world_spec import HOMES
+from missions.base.options import SeedOptions
+from missions.base.run_options import ServedWorldOptions
 from missions.cli import options_page
 from missions.cli.declared_options import DeclaredOption, chosen_names, specified
 from missions.cli.fly import fly
 from missions.cli.fly_command import _COMMANDS
 from missions.cli.main import command_line
+from missions.estimation.log_options import PlayOptions
+from missions.runs.log_play import play
+from missions.studies.options import StudyRunOptions
+from missions.studies.running import run_study
 from missions.survey.options import CALIBRATION_ALTITUDE_M, SurveyOptions
 
 PAGE = Path(__file__).parents[1] / "docs/options.md"
@@ -200,6 +215,29 @@ def test_a_command_makes_the_defaults_of_python(kind):
     with click.Context(OWNERS[kind]) as context:
         context.params = {p.name: p.get_default(context) for p in OWNERS[kind].params}
         assert specified(kind) == kind()
+
+
+def test_the_words_of_a_world_are_those_of_the_classes_that_it_is_made_of():
+    """Those classes need NumPy, so that help would be slow with them."""
+    words = {each.name: get_args(each.kind) for each in declared(ServedWorldOptions)}
+    assert words["turbulence"] == tuple(Turbulence) and words["launch"] == tuple(LaunchKind)
+    assert words["gps"] == RECEIVERS and words["autopilot"] == tuple(HOMES)
+    assert set(words["wind_profile"]) < set(WindLaw) and words["unsigned"] == tuple(UnsignedFrom)
+    assert SigningParameters().unsigned_from == ServedWorldOptions().unsigned
+
+
+@pytest.mark.parametrize(
+    ("function", "options"),
+    [(run_study, StudyRunOptions()), (play, PlayOptions()), (mutated_records, SeedOptions())],
+    ids=lambda each: getattr(each, "__name__", ""),
+)
+def test_functions_have_the_defaults_of_the_options(function, options):
+    stated = {name: p.default for name, p in signature(function).parameters.items()}
+    shared = [each.name for each in declared(type(options)) if each.name in stated]
+    assert shared
+    for name in shared:
+        value = getattr(options, name)
+        assert stated[name] == (float(value) if name == "speed" else value)
 
 
 def test_an_option_of_a_mission_is_one_field():
