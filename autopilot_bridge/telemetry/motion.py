@@ -102,7 +102,7 @@ def _fill(
     r.highres_imu__xmag = mag[_MAG] if field_known else 0.0
     r.highres_imu__ymag = mag[_MAG + 1] if field_known else 0.0
     r.highres_imu__zmag = mag[_MAG + 2] if field_known else 0.0
-    r.highres_imu__abs_pressure = baro[interface.BARO_PRESSURE_PA] * 0.01
+    r.highres_imu__abs_pressure = baro[interface.BARO_PRESSURE_PA]  # in pascal, as PX4 fills it
     r.highres_imu__pressure_alt = _pressure_altitude_m(max(0.0, baro[interface.BARO_PRESSURE_PA]))
     r.highres_imu__temperature = imu[interface.IMU_TEMPERATURE_C]
 
