@@ -9,19 +9,8 @@ from estimators.handoff.motion_watch import MotionWatch
 from estimators.vision import PictureWatch, TagDetectorParameters, load_camera
 from missions.estimation.vision_live import next_to_link
 from missions.estimation.vision_recording import over_log
-from missions.estimation.vision_request import (
-    COMPLETED,
-    FAILED,
-    INTERRUPTED,
-    OnProgress,
-    PictureProcess,
-    VisionProgress,
-    VisionRequest,
-    VisionResult,
-)
+from missions.estimation.vision_request import OnProgress, PictureProcess, VisionRequest, VisionResult
 from missions.flown.run_folder import write_summary
-
-__all__ = ["COMPLETED", "FAILED", "INTERRUPTED", "VisionProgress", "VisionRequest", "VisionResult", "watch"]
 
 
 def watch(request: VisionRequest, on_progress: OnProgress | None = None) -> VisionResult:

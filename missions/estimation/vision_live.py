@@ -12,14 +12,12 @@ from autopilot_bridge.mavlink import Frame
 from autopilot_bridge.tlog import TlogWriter
 from estimators.errors import EstimatorError, VideoError
 from estimators.messages import read_message
+from estimators.reports.summary import COMPLETED, FAILED, INTERRUPTED
 from estimators.vision.video import Picture
 from missions.errors import LinkClosed
 from missions.estimation.picture_source import LivePictures
 from missions.estimation.rates import interval_request
 from missions.estimation.vision_request import (
-    COMPLETED,
-    FAILED,
-    INTERRUPTED,
     Ended,
     Found,
     OnProgress,

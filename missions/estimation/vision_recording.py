@@ -9,11 +9,10 @@ from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from autopilot_bridge.tlog import TlogReader, TlogWriter
 from estimators.errors import EstimatorError, VideoError
 from estimators.messages import read_message
+from estimators.reports.summary import COMPLETED, FAILED
 from estimators.vehicle_time import VehicleTime, stamp_field
 from estimators.vision.video import TimedPicture, frames_of
 from missions.estimation.vision_request import (
-    COMPLETED,
-    FAILED,
     Ended,
     Found,
     OnProgress,

@@ -14,21 +14,6 @@ from estimators.vision import CameraDescription, TagDetectorParameters
 from estimators.vision.video import Picture, is_stream
 from missions.estimation.options import VisionOptions
 
-__all__ = [
-    "COMPLETED",
-    "FAILED",
-    "INTERRUPTED",
-    "Ended",
-    "OnProgress",
-    "PictureProcess",
-    "VisionProgress",
-    "VisionRequest",
-    "VisionResult",
-    "progress_of",
-]
-
-COMPLETED, FAILED, INTERRUPTED = "completed", "failed", "interrupted"
-
 Found = TypeVar("Found")
 
 

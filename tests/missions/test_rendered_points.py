@@ -28,7 +28,8 @@ from flightsim.home import Home
 from flightsim.payload import GroundTargets, MovingPointCamera, MovingPointParameters
 from missions.cli.main import run_command_line
 from missions.embedded.rendered_points import POINT_CAMERA, RenderedPoints, watched
-from missions.estimation.vision import VisionRequest, watch
+from missions.estimation.vision import watch
+from missions.estimation.vision_request import VisionRequest
 from missions.flown.camera_film import CameraFilm
 from missions.flown.camera_picture import CameraPicture, clip, png
 from tests.clients.sitl_process import free_port

@@ -8,6 +8,7 @@ import click
 from autopilot_bridge.errors import AddressError, BridgeError
 from estimators.errors import EstimatorError
 from estimators.reports.summary import FAILED, INTERRUPTED, table_lines, warnings_of
+from missions.cli import exit_codes
 from missions.cli.bodies.signing import key_from, warn_if_open
 from missions.cli.bodies.status_line import StatusLine
 from missions.cli.declared_options import specified
@@ -15,8 +16,6 @@ from missions.cli.options import in_options, report
 from missions.errors import PlanError
 from missions.estimation.live import LiveProgress, LiveRequest
 from missions.estimation.live import estimate as run_estimator
-
-_FAILED, _INTERRUPTED = 1, 130
 
 
 class _LiveProgressLine:
@@ -74,7 +73,7 @@ def estimate(**given: Any) -> int:
         report(warning)
     if result.outcome == FAILED:
         report(f"{result.reason}; results in {result.folder} are partial")
-        return _FAILED
+        return exit_codes.FAILED
     samples = result.summary["samples"]
     click.echo(f"{result.outcome}: {samples} estimates; run: {result.folder}")
-    return _INTERRUPTED if result.outcome == INTERRUPTED else 0
+    return exit_codes.INTERRUPTED if result.outcome == INTERRUPTED else 0

@@ -13,6 +13,7 @@ from autopilot_bridge.clock.pacing import wall_time_s
 from estimators.received import counted_words
 from estimators.reports import warnings_of
 from missions.cli.bodies.status_line import StatusLine, announce_compiling
+from missions.cli.exit_codes import FAILED
 from missions.cli.options import report
 from missions.flown.run_folder import POOR, wind_words
 from missions.how_left import lines
@@ -21,7 +22,6 @@ from missions.vehicle.notes import FLIGHT
 from missions.vehicle.telemetry import Position
 from missions.vehicle.vehicle import Vehicle
 
-_FAILED: Final = 1
 _PACE_S: Final = 5.0
 _PACE_LEAST_S: Final = 0.5
 KILLED: Final = 128
@@ -199,7 +199,7 @@ def print_result(result: RunResult) -> int:
         report(f"mission {summary['mission']} failed: {result.reason}")
         _report_how_left(result)
         click.echo(f"failed: see {result.folder}")
-        return _FAILED
+        return FAILED
     click.echo(
         f"{result.outcome}: {summary['mission']} with {summary['autopilot']}, "
         f"{summary['distance_m']:.0f} m in {summary['sim_time_s']:.1f} s, "
@@ -258,7 +258,7 @@ def _print_estimator(summary: Mapping[str, Any]) -> int:
     if summary["outcome"] == "completed":
         return 0
     report(f"{name}: {summary['reason']}; results are partial")
-    return _FAILED
+    return FAILED
 
 
 def _whose(block: Mapping[str, Any], summary: Mapping[str, Any]) -> str:

@@ -9,12 +9,11 @@ from estimators.errors import EstimatorError
 from estimators.logs import LogError
 from estimators.reports import notes_of, table_lines, warnings_of
 from missions.cli.declared_options import specified
+from missions.cli.exit_codes import FAILED
 from missions.cli.options import in_options, report
 from missions.errors import PlanError
 from missions.estimation.over_logs import ReplayRequest, check_out, failed, replay_logs
 from missions.estimation.report import EstimationResult
-
-_FAILED = 1
 
 
 def replay(**given: Any) -> int:
@@ -60,4 +59,4 @@ def replay(**given: Any) -> int:
             report(f"{label}: {warning}")
         samples, speed = result.summary["samples"], result.summary["wall_time_s"]
         click.echo(f"{label}: {result.outcome}, {samples} estimates in {speed:.2f} s; run: {result.folder}")
-    return _FAILED if any(failed(result) for _, result in results) else 0
+    return FAILED if any(failed(result) for _, result in results) else 0

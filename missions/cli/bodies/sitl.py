@@ -32,11 +32,11 @@ from missions.cli.bodies.storage import Losses, VehicleCards
 from missions.cli.bodies.video import start_video
 from missions.cli.bodies.world import equipped, firmware_of, world_of
 from missions.cli.declared_options import chosen_names, specified
+from missions.cli.exit_codes import FAILED
 from missions.cli.options import in_options, report
 from missions.process.ending import EndRequests
 
 _LOG_RATE_HZ = 4
-_FAILED = 1
 
 
 def _ports(links: tuple[str, ...], gcs_links: tuple[str, ...]) -> list[Port]:
@@ -216,4 +216,4 @@ def sitl(
         )
     lost = f", {server.slipped_s:.1f} s behind real time" if server.slipped_s > 0.05 else ""
     click.echo(f"stopped at {simulated.time_us * 1e-6:.1f} s of vehicle time{lost}")
-    return _FAILED if losses.any else 0
+    return FAILED if losses.any else 0

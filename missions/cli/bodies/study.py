@@ -18,6 +18,7 @@ import click
 from missions.cli.bodies.status_line import StatusLine
 from missions.cli.bodies.world import firmware_of
 from missions.cli.declared_options import Given, made_of_values
+from missions.cli.exit_codes import FAILED
 from missions.cli.mission_commands import arguments_of
 from missions.cli.options import in_options, report
 from missions.cli.study_command import StudyCommand
@@ -35,7 +36,6 @@ from missions.studies.running import StudyResult, run_study, run_trial
 from missions.studies.study import Study, Trial
 from missions.studies.trial_runner import error_text
 
-_FAILED: Final = 1
 _KILLED: Final = 128
 _SEPARATORS: Final = re.compile(r"[,;=]")  # of the values in one word
 _FILE: Final = re.compile(r"[/\\]|\.[A-Za-z]\w*$")  # a folder or a suffix
@@ -142,7 +142,7 @@ def _one_trial(study: Study[Any, Any], runs: int, seed: int, index: int) -> int:
     except Exception:  # noqa: BLE001 - whatever the trial raises is shown
         click.echo(traceback.format_exc(), nl=False, err=True)
         report(f"trial {index} failed")
-        return _FAILED
+        return FAILED
     click.echo(json.dumps(row, indent=2))
     return 0
 
@@ -214,13 +214,13 @@ def _tell(result: StudyResult) -> int:
             f"{result.folder} "
             "continues"
         )
-        return _KILLED + result.signal if result.outcome == "interrupted" else _FAILED
+        return _KILLED + result.signal if result.outcome == "interrupted" else FAILED
     without_row = result.results.without_row()
     if without_row:
         first = without_row[0]
         count = "1 trial has" if len(without_row) == 1 else f"{len(without_row)} trials have"
         report(f"{count} no row; trial {first['trial']}: {first['error']}; repeat it: {first['command']}")
-        return _FAILED
+        return FAILED
     return 0
 
 

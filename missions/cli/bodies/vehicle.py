@@ -10,8 +10,9 @@ import click
 from autopilot_bridge.clock import unix_time_us
 from autopilot_bridge.clock.pacing import wall_time_s
 from missions.cli.bodies.status_line import StatusLine
-from missions.cli.bodies.vehicle_link import FAILED, address, confirm, print_json, run, with_client
+from missions.cli.bodies.vehicle_link import address, confirm, print_json, run, with_client
 from missions.cli.declared_options import specified
+from missions.cli.exit_codes import FAILED
 from missions.preflight.finding import Finding, Level
 from missions.vehicle_client import logs as client_logs
 from missions.vehicle_client.client import VehicleClient

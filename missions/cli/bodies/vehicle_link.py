@@ -19,7 +19,6 @@ from missions.vehicle_client.listening import SIGNED, listen
 from missions.vehicle_client.options import ConnectionOptions
 
 T = TypeVar("T")
-FAILED: Final = 1
 _LISTEN_S: Final = 2.0
 
 

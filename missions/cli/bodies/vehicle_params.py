@@ -13,7 +13,8 @@ from estimators.errors import LogError
 from estimators.logs.new_file import new_file
 from flightsim.airframe import AirframeKind
 from flightsim.foundation.plain_text import plain_text
-from missions.cli.bodies.vehicle_link import FAILED, confirm, print_json, with_client
+from missions.cli.bodies.vehicle_link import confirm, print_json, with_client
+from missions.cli.exit_codes import FAILED
 from missions.cli.options import in_options, report
 from missions.errors import PlanError
 from missions.vehicle_client import parameters as client_parameters

@@ -8,16 +8,17 @@ import click
 from autopilot_bridge.errors import AddressError, BridgeError
 from estimators.errors import EstimatorError
 from estimators.handoff.motion_watch import MotionWatchParameters
+from estimators.reports.summary import FAILED, INTERRUPTED
 from estimators.vision import TagDetectorParameters
+from missions.cli import exit_codes
 from missions.cli.bodies.signing import key_from, warn_if_open
 from missions.cli.bodies.status_line import StatusLine
 from missions.cli.declared_options import chosen_names, specified
 from missions.cli.options import in_options, report
 from missions.errors import PlanError
 from missions.estimation.options import DetectorOptions
-from missions.estimation.vision import FAILED, INTERRUPTED, VisionProgress, VisionRequest, watch
-
-_FAILED, _INTERRUPTED = 1, 130
+from missions.estimation.vision import watch
+from missions.estimation.vision_request import VisionProgress, VisionRequest
 
 
 def _detector() -> TagDetectorParameters | MotionWatchParameters:
@@ -89,7 +90,7 @@ def vision(**given: Any) -> int:
         report(warning)
     if result.outcome == FAILED:
         report(f"{result.reason}; results in {result.folder} are partial")
-        return _FAILED
+        return exit_codes.FAILED
     frames, detections = result.summary["frames"], result.summary["detections"]
     click.echo(f"{result.outcome}: {detections} detections in {frames} pictures; run: {result.folder}")
-    return _INTERRUPTED if result.outcome == INTERRUPTED else 0
+    return exit_codes.INTERRUPTED if result.outcome == INTERRUPTED else 0

@@ -18,7 +18,8 @@ from autopilot_bridge.tlog import TlogReader, TlogWriter
 from estimators.errors import EstimatorError
 from estimators.messages import read_message
 from missions.cli.main import run_command_line
-from missions.estimation.vision import VisionRequest, watch
+from missions.estimation.vision import watch
+from missions.estimation.vision_request import VisionRequest
 from tests.clients.sitl_process import free_port
 from tests.estimators.vision.pictures import CAMERA, pictures
 from tests.estimators.vision.test_clock_check import seen
