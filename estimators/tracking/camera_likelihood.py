@@ -19,7 +19,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.tracking.camera_sight import CameraSight, Detection, SightModel
+from estimators.tracking.camera_sight import LEAST_HEIGHT_M, CameraSight, Detection, SightModel
 from estimators.tracking.frame_kernels import (
     BORDER,
     BROWN,
@@ -58,6 +58,8 @@ Box = tuple[float, float, float, float]
 
 _UPPER: Final = np.triu_indices(3)
 _FOLD_STEP: Final = 1.02
+_MOST_SPREAD: Final = 1e6  # variance of image coordinates from which a detection says nothing
+_ROUNDING: Final = 1e-9
 _WIDEST: Final = 10.0  # image coordinate of a border; a distortion without an inverse has no bound
 _FARTHEST: Final = 3.0  # image radius up to which the distortion is examined
 _LEAST_RATE: Final = 1e-4
@@ -145,7 +147,7 @@ class FrameLikelihood:
         box = None
         if sight.height_m > 0.0:
             box = _box(sight, model, s, reach_m)
-        return cls(numbers=s, detections=_gaussians(sight, model), box=box)
+        return cls(numbers=s, detections=_gaussians(sight, s), box=box)
 
     def at(self, north_m: Array, east_m: Array) -> Array:
         """Relative likelihoods at places (n,)."""
@@ -184,10 +186,16 @@ def _numbers(sight: CameraSight, model: SightModel) -> Array:
 
 def image_spread(ray: tuple[float, float], sight: CameraSight, model: SightModel) -> Array:
     """(2, 2) covariance of the image coordinates of a place that is seen at (a, b), by the pose alone."""
-    s = _numbers(sight, model)
-    down = float(sight.r_mount_from_ned.T[2] @ (1.0, *ray))
-    aa, ab, bb = np.add(of_place(*ray, down / sight.height_m, s), of_turn(*ray, s))
+    aa, ab, bb = _pose_spread(*ray, _numbers(sight, model))
     return np.array([[aa, ab], [ab, bb]])
+
+
+@kernel
+def _pose_spread(a: float, b: float, s: Array) -> tuple[float, float, float]:
+    """Covariance (aa, ab, bb) of the image coordinates of a place that is seen at (a, b), by the pose."""
+    down = s[ROTATION + 2] + a * s[ROTATION + 5] + b * s[ROTATION + 8]
+    place, turn = of_place(a, b, down / s[HEIGHT], s), of_turn(a, b, s)
+    return place[0] + turn[0], place[1] + turn[1], place[2] + turn[2]
 
 
 def ground_spread(ray: tuple[float, float], sight: CameraSight, model: SightModel) -> Array:
@@ -199,14 +207,19 @@ def ground_spread(ray: tuple[float, float], sight: CameraSight, model: SightMode
     return np.array([[nn, ne], [ne, ee]])
 
 
-def _gaussians(sight: CameraSight, model: SightModel) -> Array:
+def _gaussians(sight: CameraSight, s: Array) -> Array:
     """(m, 6) of the detections. The density is that of a detection alone, also where it repeats earlier ones
     and its root is small: so much more probable is it than a false one.
     """
-    noise = (model.pixel_sigma_px / sight.focal_px) ** 2 * np.eye(2)
-    rows = []
+    rows, noise = [], float(s[NOISE])
     for k, (a, b) in enumerate(sight.detections.tolist()):
-        alone = Detection.of_covariance((a, b), image_spread((a, b), sight, model) + noise)
+        aa, ab, bb = _pose_spread(a, b, s) if sight.height_m > LEAST_HEIGHT_M else (math.inf,) * 3
+        aa, bb = max(0.0, aa) + noise, max(0.0, bb) + noise
+        if not max(aa, bb) < _MOST_SPREAD:
+            rows.append([a, b, 0.0, 0.0, 0.0, 0.0])
+            continue
+        most = (1.0 - _ROUNDING) * math.sqrt(aa * bb)  # covariances of single-precision numbers
+        alone = Detection.of_covariance(a, b, aa, min(max(ab, -most), most), bb)
         root = alone[2:] if sight.roots is None else sight.roots[k].tolist()
         rows.append([a, b, *root, alone.first * alone.last / math.tau])
     return np.array(rows, dtype=np.float64).reshape(-1, 6)

@@ -33,6 +33,9 @@ Array = NDArray[np.float64]
 MAX_DETECTIONS: Final = 2
 """Detections of the target in one frame that a likelihood counts; of one target at most one is true."""
 
+LEAST_HEIGHT_M: Final = 0.1
+"""Height of a camera above the ground below which its detections say nothing."""
+
 _LEAST_DOWN: Final = 1e-3  # of a ray that meets the ground
 
 
@@ -48,9 +51,11 @@ class Detection(NamedTuple):
     last: float
 
     @classmethod
-    def of_covariance(cls, ray: tuple[float, float], covariance: Array) -> "Detection":
-        """The Gaussian of a mean and a covariance (2, 2)."""
-        return cls(*ray, *lower_root(np.linalg.cholesky(np.linalg.inv(covariance))))
+    def of_covariance(cls, a: float, b: float, aa: float, ab: float, bb: float) -> "Detection":
+        """The Gaussian of a mean and a covariance."""
+        determinant = aa * bb - ab * ab
+        first = math.sqrt(bb / determinant)
+        return cls(a, b, first, -ab / (determinant * first), 1.0 / (first * math.sqrt(determinant)))
 
 
 def lower_root(root: Array) -> tuple[float, float, float]:
@@ -297,8 +302,9 @@ class CameraSight:
             if by_ground is not None:
                 lower = np.array([[root[0], 0.0], [root[1], root[2]]])
                 wide = lower.T @ by_ground
-                rest = np.linalg.inv(np.eye(2) + variance_m2 * wide @ wide.T)
-                root[:] = lower_root(lower @ np.linalg.cholesky(rest))
+                squares, axes = np.linalg.eigh(wide @ wide.T)
+                rest = axes / np.sqrt(1.0 + variance_m2 * np.maximum(0.0, squares))
+                root[:] = lower_root(lower @ rest)
         place_m2 = self.place_m2 + np.diag([variance_m2, variance_m2, 0.0])
         return replace(self, place_m2=place_m2, roots=roots)
 
@@ -323,7 +329,7 @@ class CameraSight:
         a, b = ray.tolist()
         r = self.r_mount_from_ned
         down = float(r.T[2] @ (1.0, a, b))
-        if not (down > _LEAST_DOWN and self.height_m > 0.0):
+        if not (down > _LEAST_DOWN and self.height_m > LEAST_HEIGHT_M):
             return None
         return np.asarray((r[1:, :2] - np.outer((a, b), r[0, :2])) * (down / self.height_m))
 

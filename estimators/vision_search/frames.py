@@ -23,6 +23,7 @@ __all__ = ["Camera", "likelihood_of", "sight_of"]
 
 _KEPT: Final = 8  # exposures with detections whose frame has not ended
 _STEP_US: Final = 500_000  # over which velocities are taken
+_MOST_M_S: Final = 100.0  # of a position that jumps
 _REMEMBERED: Final = 20_000  # frames by number
 
 
@@ -177,7 +178,10 @@ def _camera_place(pose: VehiclePose, scan: CameraScan) -> Vector:
 def _rate(now: Sequence[float], before: Sequence[float]) -> tuple[float, float]:
     """Velocity, north and east, between two places."""
     step_s = 1e-6 * _STEP_US
-    return (now[0] - before[0]) / step_s, (now[1] - before[1]) / step_s
+    north, east = (
+        min(max((a - b) / step_s, -_MOST_M_S), _MOST_M_S) for a, b in zip(now[:2], before[:2], strict=True)
+    )
+    return north, east
 
 
 def _rate_on_ground(

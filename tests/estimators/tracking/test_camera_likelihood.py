@@ -1,6 +1,7 @@
 """The likelihood of a camera's frame: against the paper's tables, and against drawn poses."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -71,6 +72,7 @@ def test_the_rate_is_bayes_rule_on_the_resolutions():
     assert PAPER_RATE.probability(150.0) == pytest.approx(0.895, abs=5e-4)
 
 
+NO_ERRORS = PoseErrors(**NONE)
 ERRORS = PoseErrors(
     forward_m=3.0, right_m=1.5, height_m=2.0, yaw_rad=0.03, pitch_rad=0.03, roll_rad=0.02, mount_rad=0.01
 )
@@ -181,6 +183,23 @@ def test_the_fold_is_where_the_distorted_radius_stops_growing(distortion):
     growth = np.gradient(radius * (1.0 + k1 * radius**2 + k2 * radius**4 + k3 * radius**6), radius)
     fold = radius[np.argmax(growth <= 0.05)]
     assert math.sqrt(_fold(distortion)) == pytest.approx(fold, rel=0.021)
+
+
+@pytest.mark.parametrize("height_m", [0.0, 1e-30, 1e-3, 60.0, 1e30])
+@pytest.mark.parametrize("root", [(0.0, 0.0, 0.0), (65_000.0, -65_000.0, 65_000.0), (1e-7, 65_000.0, 0.0)])
+def test_extreme_numbers_of_other_vehicles_do_not_raise(height_m, root):
+    """As they may come over a link; covariances of rounded numbers are not quite positive definite."""
+    seen = replace(
+        sight(NO_ERRORS, place=(0.0, 0.0, -height_m), detections=[(10.0, -10.0)]),
+        place_m2=np.array([[1e8, 1e8 + 1.0, 0.0], [1e8 + 1.0, 1e8, 0.0], [0.0, 0.0, 1e8]]),
+        rotation_rad2=np.full((3, 3), 10.0),
+        roots=np.array([root]),
+    )
+    for frame in (seen, seen.blurred(0.04), replace(seen, roots=None)):
+        assert frame.known_m2 >= 0.0
+        likelihood = FrameLikelihood.of(frame, SURE, 1e3)
+        assert np.all(likelihood.at(np.zeros(2), np.array([0.0, 50.0])) >= 0.0)
+        assert np.all(np.isfinite(likelihood.places()))
 
 
 def test_two_detections_share_the_chance_to_be_true():
