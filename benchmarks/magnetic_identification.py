@@ -56,8 +56,7 @@ class PlainFilter:
             cosine * np.cos(turn) - sine * np.sin(turn),
             sine * np.cos(turn) + cosine * np.sin(turn),
         )
-        size = rows[p.SIZE]
-        square = (rows[p.X] / (of.sigma_along_m * size)) ** 2 + (rows[p.Y] / (of.sigma_across_m * size)) ** 2
+        square = (rows[p.X] * rows[p.PER_ALONG]) ** 2 + (rows[p.Y] * rows[p.PER_ACROSS]) ** 2
         term = of.amplitude_nt * np.exp(-0.5 * square)
         map_nt = DECAY * rows[p.MAP]
         aa, ab = rows[p.AMPLITUDE_VAR], DECAY * rows[p.AMPLITUDE_MAP]

@@ -2,7 +2,10 @@
 
 Source: Lum, Rysdyk and Pongpunwattana 2005, section III. The paper has one hypothesis, the target, and reads
 its confidence; here every class has a filter, and the probabilities of the classes follow from their
-evidences (Bayes). The paper's filter, with white noise and a fixed signature, runs beside them.
+evidences (Bayes). Beside the classes stand explanations by something else, so that the target must fit better
+than these and not only better than the known false anomalies; and a target that fits badly loses its
+probability although nothing else fits (`goodness`). The paper's filter, with white noise and a fixed
+signature, runs beside them.
 """
 
 import math
@@ -13,16 +16,19 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.magnetic_identification.classes import AnomalyClass, GaussianClass
+from estimators.magnetic_identification.classes import AnomalyClass, DipoleClass, GaussianClass
+from estimators.magnetic_identification.goodness import fitting_share
 from estimators.magnetic_identification.hypotheses import (
     Before,
     Control,
+    EdgeHypothesis,
     Hypothesis,
     Measurement,
     ShapelessHypothesis,
 )
 from estimators.magnetic_identification.parameters import IdentificationParameters
 from estimators.magnetic_identification.particle_hypotheses import (
+    BodyHypothesis,
     DipoleHypothesis,
     GaussianHypothesis,
     ParticleHypothesis,
@@ -31,16 +37,24 @@ from estimators.magnetic_identification.samples import LikelyPlace, Sample, Trac
 from estimators.occupancy.detection import MapError
 from estimators.tracking.modes import Mode, find_modes
 
-__all__ = ["BACKGROUND", "UNKNOWN", "Anomaly"]
+__all__ = ["BACKGROUND", "OTHERS", "Anomaly"]
 
 Array = NDArray[np.float64]
 
-UNKNOWN: Final = "unknown"
-"""Name of the hypothesis that an anomaly has another shape."""
 BACKGROUND: Final = "background"
 """Name of the hypothesis that there is only the error of the map."""
-_BACKGROUND_PRIOR: Final = 0.3  # of what is no target
-_UNKNOWN_PRIOR: Final = 0.1
+OTHERS: Final = ("other body", "other dipole", "map edge", "unknown")
+"""Names of the hypotheses that an anomaly is something else than a class: a body of any extent, a dipole of
+any depth, the edge of a tile of the map, and a source of any shape.
+"""
+_BACKGROUND_PRIOR: Final = 0.15  # of what is no target
+_OTHER_PRIORS: Final = (0.28, 0.1, 0.05, 0.05)  # of what is no target, in the order of `OTHERS`
+_ANY_DIPOLE: Final = DipoleClass(name="dipole", strength_nt=15.0, least_m=20.0, most_m=400.0)
+_HOPELESS_NATS: Final = 30.0  # a hypothesis so far behind the best one is not followed any more
+_FIRST: Final = 3  # so many times more particles of bodies begin, and of classes
+_FIRST_OF_CLASS: Final = 2
+_FEWER: Final = 2  # dipoles have so many times fewer particles: their strengths are not sampled
+_ADJOINING_NATS: Final = math.log(10.0)  # sources are seldom so near to each other, parts of a body always
 _LONGEST_STEP_M: Final = 50.0  # the noise of a motion does not grow beyond it: positions are absolute
 _SHIFTS: Final = 8  # of a place to the mean around it
 
@@ -50,7 +64,7 @@ class Anomaly:
 
     Attributes:
         number: from 0, in the order of time.
-        names: of the hypotheses: the classes, `UNKNOWN` and `BACKGROUND`.
+        names: of the hypotheses: the classes, `OTHERS` and `BACKGROUND`.
         log_evidence: (hypotheses,) logarithms.
         trace: after each measurement.
         passes: number of passes over it.
@@ -92,26 +106,39 @@ class Anomaly:
         self._last = first
         self._loudest = first
         self._sought = [k for k, of in enumerate(classes) if of.sought]
+        gaussians = [of for of in classes if of.sought and isinstance(of, GaussianClass)]
         hypotheses: list[Hypothesis] = []
         for of in classes:
             if isinstance(of, GaussianClass):
-                hypotheses.append(GaussianHypothesis(of, q.particles, rng, by_roulette=q.roulette))
+                hypotheses.append(
+                    GaussianHypothesis(of, q.particles, rng, first=_FIRST_OF_CLASS, by_roulette=q.roulette)
+                )
             else:
                 hypotheses.append(
-                    DipoleHypothesis(of, q.particles, rng, field_ned=field_ned, by_roulette=q.roulette)
+                    DipoleHypothesis(
+                        of, q.particles // _FEWER, rng, field_ned=field_ned, by_roulette=q.roulette
+                    )
                 )
         hypotheses += [
+            BodyHypothesis(gaussians, q.particles, rng, first=_FIRST, by_roulette=q.roulette),
+            DipoleHypothesis(
+                _ANY_DIPOLE, q.particles // _FEWER, rng, field_ned=field_ned, by_roulette=q.roulette
+            ),
+            EdgeHypothesis(q.unknown_nt),
             ShapelessHypothesis(math.hypot(q.unknown_nt, map_error.sigma_nt), q.unknown_m),
             ShapelessHypothesis(map_error.sigma_nt),
         ]
-        self.names = (*(of.name for of in classes), UNKNOWN, BACKGROUND)
+        self.names = (*(of.name for of in classes), *OTHERS, BACKGROUND)
         self._hypotheses = hypotheses
+        self._is_sought: NDArray[np.bool_] = np.isin(np.arange(len(hypotheses)), self._sought)
+        self._misfits: Array = np.zeros(len(hypotheses))
+        self._steps = 0
+        self._adjoins = False
         self._log_prior = np.log(_priors(classes, q.target_prior))
         self.log_evidence: Array = np.zeros(len(hypotheses))
-        gaussian = next((of for of in classes if of.sought and isinstance(of, GaussianClass)), None)
         self._paper: GaussianHypothesis | None = None
-        if gaussian is not None:
-            exact = replace(gaussian, amplitude_spread=0.0, size_spread=0.0)
+        if gaussians:
+            exact = replace(gaussians[0], amplitude_spread=0.0, size_spread=0.0)
             self._paper = GaussianHypothesis(exact, q.particles, rng, by_roulette=q.roulette)
         seen = self._measurement(first)
         before = self._before(first, last, threshold_nt)
@@ -126,16 +153,33 @@ class Anomaly:
         """One more measurement of any vehicle."""
         seen = self._measurement(sample)
         control = self._control(self._last, sample)
+        best = int(np.argmax(self.log_evidence))
+        behind = self.log_evidence - self.log_evidence[best] < -_HOPELESS_NATS
         for k, hypothesis in enumerate(self._hypotheses):
-            self.log_evidence[k] += hypothesis.step(control, seen)[0]
+            if behind[k]:
+                continue
+            update = hypothesis.step(control, seen)
+            self.log_evidence[k] += update.log_density
+            self._misfits[k] += update.misfit
+            if k == best:
+                self.log_evidence[behind] += update.log_density
+        self._steps += 1
         confidence = math.nan
         if self._paper is not None:
             exact = replace(control, decay=0.0, drive_nt2=0.0)
-            confidence = self._paper.step(exact, self._white(seen))[1]
+            confidence = self._paper.step(exact, self._white(seen)).confidence
         self._last = sample
         if abs(sample.residual_nt) > abs(self._loudest.residual_nt):
             self._loudest = sample
         self._note(sample, confidence)
+
+    def adjoin(self) -> None:
+        """Note that the anomaly goes on into another one without a gap: they are rather one long body than
+        two sources beside each other.
+        """
+        if not self._adjoins:
+            self._adjoins = True
+            self._log_prior[self._sought] -= _ADJOINING_NATS
 
     def restore(self, kept: "Anomaly") -> None:
         """Return to the state of an earlier copy (`copy.deepcopy`), which must not be used any more."""
@@ -179,7 +223,9 @@ class Anomaly:
         q = self._parameters
         return Measurement(
             residual_nt=sample.residual_nt,
-            white_nt2=q.noise_nt**2 / sample.readings + (q.shape_error * sample.residual_nt) ** 2,
+            white_nt2=q.noise_nt**2 / sample.readings
+            + sample.excess_nt2
+            + (q.shape_error * sample.residual_nt) ** 2,
             height_m=sample.height_m,
             course_rad=sample.course_rad,
         )
@@ -190,7 +236,6 @@ class Anomaly:
 
     def _note(self, sample: Sample, confidence: float) -> None:
         self._place_ne_m = None
-        sought = np.isin(np.arange(len(self.log_evidence)), self._sought)
         self.trace.append(
             TracePoint(
                 time_us=sample.time_us,
@@ -198,16 +243,28 @@ class Anomaly:
                 residual_nt=sample.residual_nt,
                 confidence=confidence,
                 probability=self.probability,
-                evidence=float(self.log_evidence[sought].max() - self.log_evidence[~sought].max()),
+                evidence=float(
+                    self.log_evidence[self._is_sought].max() - self.log_evidence[~self._is_sought].max()
+                ),
             )
         )
 
     @property
     def probabilities(self) -> Array:
-        """(hypotheses,) probability of each."""
-        logs = self._log_prior + self.log_evidence
+        """(hypotheses,) probability of each.
+
+        Where the best explanation is off by more than it predicts, the noise is larger than assumed, and all
+        evidence counts less by as much.
+        """
+        logs = self._log_prior + self.log_evidence / self._excess
         shares: Array = np.exp(logs - logs.max())
         return shares / shares.sum()
+
+    @property
+    def _excess(self) -> float:
+        """Variance of the whitened residuals of the best explanation, where it is more than one."""
+        best = int(np.argmax(self._log_prior + self.log_evidence))
+        return max(1.0, float(self._misfits[best]) / self._steps) if self._steps else 1.0
 
     @property
     def log_density(self) -> float:
@@ -217,19 +274,27 @@ class Anomaly:
 
     @property
     def probability(self) -> float:
-        """Probability that the anomaly is one of the targets."""
-        return float(self.probabilities[self._sought].sum())
+        """Probability that the anomaly is one of the targets: that of their evidence, as far as they fit."""
+        shares = self.probabilities[self._sought]
+        return float(sum(share * self._fitting(k) for k, share in zip(self._sought, shares, strict=True)))
+
+    @property
+    def background(self) -> float:
+        """Probability that there is only the error of the map."""
+        return float(self.probabilities[-1])
+
+    def _fitting(self, number: int) -> float:
+        """What is left of the probability of a hypothesis for its goodness of fit."""
+        return fitting_share(float(self._misfits[number]), self._steps)
 
     @property
     def place_ne_m(self) -> tuple[float, float]:
         """Mean place under the most probable class, from the map's home."""
         if self._place_ne_m is None:
-            best = int(np.argmax(self.probabilities[:-2]))
-            hypothesis = self._hypotheses[best]
-            self._place_ne_m = self._loudest.north_m, self._loudest.east_m
-            if isinstance(hypothesis, ParticleHypothesis):
-                forward_m, right_m = hypothesis.weights @ hypothesis.sources()[:, :2]
-                self._place_ne_m = self._in_map(float(forward_m), float(right_m))
+            # of the classes: a body of any extent may be anywhere after few measurements
+            best = self._hypotheses[int(np.argmax(self.probabilities[: -len(OTHERS) - 1]))]
+            assert isinstance(best, ParticleHypothesis)
+            self._place_ne_m = self._in_map(*best.mean_place_m())
         return self._place_ne_m
 
     def likeliest_place(self, radius_m: float) -> LikelyPlace:
@@ -273,7 +338,7 @@ class Anomaly:
         probable particles; None: an unknown shape predicts nothing.
         """
         found: list[Array | None] = []
-        for hypothesis in self._hypotheses[:-2]:
+        for hypothesis in self._hypotheses[:-1]:
             if not isinstance(hypothesis, ParticleHypothesis):
                 found.append(None)
                 continue
@@ -285,7 +350,7 @@ class Anomaly:
                     cosine * off_n + sine * off_e, cosine * off_e - sine * off_n, height_m, count
                 )
             )
-        return [*found, None, np.zeros((1, len(north_m)))]
+        return [*found, np.zeros((1, len(north_m)))]
 
     def _in_map(self, forward_m: float, right_m: float) -> tuple[float, float]:
         last = self._last
@@ -299,12 +364,10 @@ class Anomaly:
 def _priors(classes: Sequence[AnomalyClass], target_prior: float) -> Array:
     """Probabilities of the hypotheses before any measurement."""
     sought = sum(of.sought for of in classes)
-    others = len(classes) - sought
+    known = len(classes) - sought
     rest = 1.0 - target_prior
-    unknown, background = _UNKNOWN_PRIOR * rest, _BACKGROUND_PRIOR * rest
-    known = rest - unknown - background
-    if not others:
-        unknown, known = unknown + known, 0.0
-    return np.array(
-        [target_prior / sought if of.sought else known / others for of in classes] + [unknown, background]
-    )
+    others = [share * rest for share in (*_OTHER_PRIORS, _BACKGROUND_PRIOR)]
+    left = rest - sum(others)
+    if not known:
+        others[-2], left = others[-2] + left, 0.0
+    return np.array([target_prior / sought if of.sought else left / known for of in classes] + others)

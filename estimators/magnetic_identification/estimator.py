@@ -237,7 +237,7 @@ def estimate_of(anomaly: Anomaly, time_us: int) -> IdentificationEstimate:
         anomaly=anomaly.number,
         passes=anomaly.passes,
         probability=newest.probability,
-        background=float(anomaly.probabilities[-1]),
+        background=anomaly.background,
         confidence=newest.confidence,
         evidence=newest.evidence,
         modes=tuple(anomaly.modes()),

@@ -1,5 +1,6 @@
 """What a hypothesis about one anomaly takes and gives, and the hypotheses without a signature: the error of
-the map, and a body of unknown shape. Those of classes are in `particle_hypotheses`.
+the map, the edge of a tile of it, and a body of unknown shape. Those with a signature are in
+`particle_hypotheses`.
 
 The evidence of a hypothesis is the probability density of all measurements under it, given that they begin an
 anomaly.
@@ -12,7 +13,16 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Before", "Control", "Hypothesis", "Measurement", "ShapelessHypothesis", "log_beyond"]
+__all__ = [
+    "Before",
+    "Control",
+    "EdgeHypothesis",
+    "Hypothesis",
+    "Measurement",
+    "ShapelessHypothesis",
+    "Update",
+    "log_beyond",
+]
 
 Array = NDArray[np.float64]
 
@@ -70,6 +80,22 @@ class Before:
     control: Control
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Update:
+    """What a measurement says about a hypothesis.
+
+    Attributes:
+        log_density: logarithm of its density, given the measurements before it, 1/nT.
+        confidence: the paper's (7), 0..1.
+        misfit: square of the difference between measurement and prediction, over the variance that is
+            predicted for it: one in the mean where the hypothesis is right, whatever came before.
+    """
+
+    log_density: float
+    confidence: float
+    misfit: float
+
+
 class Hypothesis(Protocol):
     """One explanation of an anomaly."""
 
@@ -88,12 +114,8 @@ class Hypothesis(Protocol):
             Logarithm of the density of the measurements, given that they begin an anomaly.
         """
 
-    def step(self, control: Control, seen: Measurement) -> tuple[float, float]:
-        """One more measurement.
-
-        Returns:
-            Logarithm of the measurement's density given those before it, and the confidence (7), 0..1.
-        """
+    def step(self, control: Control, seen: Measurement) -> Update:
+        """One more measurement."""
 
 
 class ShapelessHypothesis:
@@ -117,13 +139,14 @@ class ShapelessHypothesis:
         self._mean_nt, self._variance_nt2 = 0.0, variance_nt2
         if before is None:
             beyond = log_beyond(threshold_nt, np.array([math.sqrt(variance_nt2 + seen.white_nt2)]))
-            return self._update(seen)[0] - beyond
-        total_nt2 = variance_nt2 + before.seen.white_nt2
-        correlation = self._decay(before.control)[0] * variance_nt2 / total_nt2
-        beginning = _log_entering(threshold_nt / math.sqrt(total_nt2), correlation)
-        return self._update(before.seen)[0] + self.step(before.control, seen)[0] - beginning
+            return self._update(seen).log_density - beyond
+        total_nt = math.sqrt(variance_nt2 + before.seen.white_nt2)
+        shared_nt2 = self._decay(before.control)[0] * variance_nt2
+        beginning = _log_entering(threshold_nt, total_nt, total_nt, shared_nt2)
+        first = self._update(before.seen).log_density
+        return first + self.step(before.control, seen).log_density - beginning
 
-    def step(self, control: Control, seen: Measurement) -> tuple[float, float]:
+    def step(self, control: Control, seen: Measurement) -> Update:
         decay, drive_nt2 = self._decay(control)
         self._mean_nt *= decay
         self._variance_nt2 = decay * decay * self._variance_nt2 + drive_nt2
@@ -136,14 +159,65 @@ class ShapelessHypothesis:
         decay = math.exp(-math.hypot(control.forward_m, control.right_m) / self._correlation_m)
         return decay, (1.0 - decay * decay) * self._sigma_nt2
 
-    def _update(self, seen: Measurement) -> tuple[float, float]:
+    def _update(self, seen: Measurement) -> Update:
         total_nt2 = self._variance_nt2 + seen.white_nt2
         residual_nt = seen.residual_nt - self._mean_nt
         fit = residual_nt * residual_nt / total_nt2
         gain = self._variance_nt2 / total_nt2
         self._mean_nt += gain * residual_nt
         self._variance_nt2 *= 1.0 - gain
-        return -0.5 * (fit + math.log(math.tau * total_nt2)), math.exp(-0.5 * fit)
+        return _update_of(fit, total_nt2)
+
+
+class EdgeHypothesis:
+    """The edge of a tile of the map, or of a line that is levelled wrongly: an offset that begins with the
+    anomaly and stays, beside the error of the map. Its evidence is exact.
+
+    Args:
+        sigma_nt: standard deviation of the offset.
+    """
+
+    def __init__(self, sigma_nt: float) -> None:
+        self._sigma_nt2 = sigma_nt * sigma_nt
+        self._mean_nt: Array = np.zeros(2)  # offset, error of the map
+        self._covariance_nt2: Array = np.zeros((2, 2))
+
+    def start(
+        self, seen: Measurement, map_nt2: float, threshold_nt: float = 0.0, before: Before | None = None
+    ) -> float:
+        self._mean_nt = np.zeros(2)
+        self._covariance_nt2 = np.diag((self._sigma_nt2, map_nt2))
+        now_nt = math.sqrt(self._sigma_nt2 + map_nt2 + seen.white_nt2)
+        if before is None:
+            return self._update(seen, 1.0).log_density - log_beyond(threshold_nt, np.array([now_nt]))
+        then_nt = math.sqrt(map_nt2 + before.seen.white_nt2)
+        beginning = _log_entering(threshold_nt, then_nt, now_nt, before.control.decay * map_nt2)
+        first = self._update(before.seen, 0.0).log_density
+        return first + self.step(before.control, seen).log_density - beginning
+
+    def step(self, control: Control, seen: Measurement) -> Update:
+        decays = np.array([1.0, control.decay])
+        self._mean_nt *= decays
+        self._covariance_nt2 *= np.outer(decays, decays)
+        self._covariance_nt2[1, 1] += control.drive_nt2
+        return self._update(seen, 1.0)
+
+    def _update(self, seen: Measurement, offset: float) -> Update:
+        """Correct by a measurement behind the edge (offset 1) or before it (0)."""
+        row = np.array([offset, 1.0])
+        gain = self._covariance_nt2 @ row
+        total_nt2 = float(row @ gain) + seen.white_nt2
+        residual_nt = seen.residual_nt - float(row @ self._mean_nt)
+        self._mean_nt += gain * (residual_nt / total_nt2)
+        self._covariance_nt2 -= np.outer(gain, gain) / total_nt2
+        return _update_of(residual_nt * residual_nt / total_nt2, total_nt2)
+
+
+def _update_of(fit: float, total_nt2: float) -> Update:
+    """What a measurement says about a hypothesis that predicts a normal number."""
+    return Update(
+        log_density=-0.5 * (fit + math.log(math.tau * total_nt2)), confidence=math.exp(-0.5 * fit), misfit=fit
+    )
 
 
 def log_beyond(threshold_nt: float, sigmas_nt: Array) -> float:
@@ -153,21 +227,27 @@ def log_beyond(threshold_nt: float, sigmas_nt: Array) -> float:
     return math.log(max(sum(shares) / len(shares), 1e-300))
 
 
-def _log_entering(threshold: float, correlation: float) -> float:
-    """Logarithm of the probability that the first of two standard normal numbers is within a threshold and
-    the second one beyond it.
+def _log_entering(threshold_nt: float, then_nt: float, now_nt: float, shared_nt2: float) -> float:
+    """Logarithm of the probability that the first of two normal numbers without a mean is within a threshold
+    and the second one beyond it.
+
+    Args:
+        threshold_nt: the threshold.
+        then_nt, now_nt: their standard deviations.
+        shared_nt2: their covariance.
     """
-    second = threshold + np.linspace(0.0, 8.0, 161)
-    apart = math.sqrt(max(1e-12, 1.0 - correlation * correlation)) * math.sqrt(2.0)
+    second = threshold_nt + now_nt * np.linspace(0.0, 8.0, 161)
+    slope = shared_nt2 / (now_nt * now_nt)
+    apart = math.sqrt(max(1e-12 * then_nt * then_nt, then_nt * then_nt - slope * shared_nt2)) * math.sqrt(2.0)
     within = np.array(
         [
             0.5
             * (
-                math.erf((threshold - correlation * value) / apart)
-                - math.erf((-threshold - correlation * value) / apart)
+                math.erf((threshold_nt - slope * value) / apart)
+                - math.erf((-threshold_nt - slope * value) / apart)
             )
             for value in second.tolist()
         ]
     )
-    density = np.exp(-0.5 * second * second) / math.sqrt(math.tau) * within
+    density = np.exp(-0.5 * (second / now_nt) ** 2) / (now_nt * math.sqrt(math.tau)) * within
     return math.log(max(2.0 * float(np.trapezoid(density, second)), 1e-300))

@@ -5,8 +5,9 @@ is within reach of a known one, whose particles then take it as one more. A pass
 are small again or the vehicle has left; the particles are kept for the next one.
 
 A pass near a known anomaly may be over another source, or the known one may have been an error of the map. A
-rival anomaly therefore begins with each such pass and takes its measurements too. At the end of the pass, the
-one that predicted them better keeps them (Bayes factor); if that is the rival, the known one is as it was.
+rival anomaly therefore begins with each such pass and takes its measurements too; likewise where a pass goes
+on after some track on which nothing was. At the end of the pass, the one that predicted them better keeps
+them (Bayes factor); if that is the rival, the known one is as it was.
 """
 
 import copy
@@ -18,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimators.magnetic_identification.anomaly import Anomaly
+from estimators.magnetic_identification.noise_level import NoiseLevel
 from estimators.magnetic_identification.parameters import IdentificationParameters
 from estimators.magnetic_identification.samples import Sample
 from estimators.occupancy.detection import AnomalyDetector, MapError
@@ -30,6 +32,8 @@ Array = NDArray[np.float64]
 
 _ENDS_AFTER_M: Final = 100.0  # of track with small measurements: the end of a pass
 _SMALL: Final = 0.5  # of the threshold
+_SIGMAS: Final = 3.0
+_APART_M: Final = 50.0  # of track with small measurements within a pass: what follows may be another source
 _LEAST_STEP_M: Final = 1.0  # shorter displacements give no course
 _ANOTHER_NATS: Final = 6.0  # by which a rival must be better: other sources within reach are seldom
 
@@ -55,7 +59,7 @@ class Progress:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Rival:
-    """The alternative while a known anomaly is passed again: the measurements are about another source.
+    """The alternative while a known anomaly is passed: the measurements are about another source.
 
     Attributes:
         anomaly: of that source, begun with the pass.
@@ -77,6 +81,8 @@ class _Vehicle:
 
     Attributes:
         detector: level of the differences.
+        noise: noise of the measurements.
+        threshold_nt: beyond which the newest measurement is an anomaly.
         began_us: begin of the interval that is averaged.
         sums: of north, east, height, residual; and the number of readings.
         last: newest measurement.
@@ -88,6 +94,8 @@ class _Vehicle:
     """
 
     detector: AnomalyDetector
+    noise: NoiseLevel
+    threshold_nt: float
     began_us: int = -1
     sums: list[float] = field(default_factory=lambda: [0.0] * 5)
     last: Sample | None = None
@@ -143,9 +151,6 @@ class Identifier:
         self._streams = RandomStreams(parameters.seed)
         self._rivals = 0
         self._vehicles: dict[int, _Vehicle] = {}
-        self._threshold_nt = max(
-            parameters.threshold_nt, 3.0 * math.hypot(parameters.noise_nt, map_error.sigma_nt)
-        )
 
     @property
     def dropped(self) -> int:
@@ -174,7 +179,9 @@ class Identifier:
                 noise_nt=self._parameters.noise_nt,
                 map_error=self._map_error,
             )
-            vehicle = self._vehicles[number] = _Vehicle(detector=detector)
+            vehicle = self._vehicles[number] = _Vehicle(
+                detector=detector, noise=NoiseLevel(self._map_error), threshold_nt=self._threshold_nt(0.0)
+            )
         dropped, restarts = vehicle.detector.dropped, vehicle.detector.restarts
         vehicle.detector.update(reading.time_us, reading.total_nt, map_nt, reading.north_m, reading.east_m)
         if vehicle.detector.dropped > dropped:
@@ -196,6 +203,11 @@ class Identifier:
             vehicle.sums[k] += value
         return None if complete is None else self._advance(vehicle, complete)
 
+    def _threshold_nt(self, excess_nt2: float) -> float:
+        """Beyond which a measurement is an anomaly: three standard deviations of map and noise, or more."""
+        variance_nt2 = self._parameters.noise_nt**2 + self._map_error.sigma_nt**2 + excess_nt2
+        return max(self._parameters.threshold_nt, _SIGMAS * math.sqrt(variance_nt2))
+
     def _complete(self, number: int, vehicle: _Vehicle) -> Sample:
         """The mean of the readings of an interval."""
         count = vehicle.sums[4]
@@ -206,6 +218,7 @@ class Identifier:
             off_n, off_e = north_m - last.north_m, east_m - last.east_m
             moved = math.hypot(off_n, off_e) >= _LEAST_STEP_M
             course_rad = math.atan2(off_e, off_n) if moved else last.course_rad
+        turn_rad = 0.0 if last is None else math.remainder(course_rad - last.course_rad, math.tau)
         return Sample(
             time_us=vehicle.began_us,
             vehicle=number,
@@ -215,11 +228,13 @@ class Identifier:
             course_rad=course_rad,
             residual_nt=residual_nt,
             readings=int(count),
+            excess_nt2=vehicle.noise.excess_nt2(turn_rad),
         )
 
     def _advance(self, vehicle: _Vehicle, sample: Sample) -> Progress:
         last, vehicle.last = vehicle.last, sample
-        loud = abs(sample.residual_nt) > self._threshold_nt
+        vehicle.threshold_nt = self._threshold_nt(sample.excess_nt2)
+        loud = abs(sample.residual_nt) > vehicle.threshold_nt
         present, passed = self._within_reach(sample), vehicle.anomaly
         ended: Anomaly | None = None
         loudest, doubted = vehicle.loudest, vehicle.detector.level_doubtful
@@ -232,11 +247,22 @@ class Identifier:
         if present is not None:
             self._take(vehicle, present, sample, last if loud else None)
         elif loud and last is not None:
-            present = vehicle.anomaly = self._start(sample, last)
+            present = vehicle.anomaly = self._start(sample, last, vehicle.threshold_nt)
             if vehicle.detector.level_doubtful:
                 vehicle.doubtful.append(present)
+        elif last is not None:
+            vehicle.noise.take(
+                sample.residual_nt,
+                self._parameters.noise_nt**2 / sample.readings,
+                math.hypot(sample.north_m - last.north_m, sample.east_m - last.east_m),
+                math.remainder(sample.course_rad - last.course_rad, math.tau),
+            )
+        goes_on = loud and last is not None and abs(last.residual_nt) > vehicle.threshold_nt
+        if goes_on and passed is not None and present is not None and present is not passed:
+            passed.adjoin()
+            present.adjoin()
         if vehicle.anomaly is not None:
-            largest = vehicle.note(sample, last, small_nt=_SMALL * self._threshold_nt)
+            largest = vehicle.note(sample, last, small_nt=_SMALL * vehicle.threshold_nt)
             doubted = doubted or (vehicle.rival is not None and vehicle.rival.wins(vehicle.anomaly))
             loudest = loudest if ended is not None else largest
             if vehicle.small_m >= _ENDS_AFTER_M:
@@ -258,15 +284,21 @@ class Identifier:
         if vehicle.anomaly is None and last is not None:
             vehicle.anomaly = known
             if not known.under_way:
-                kept = copy.deepcopy(known)
-                vehicle.rival = _Rival(anomaly=self._new(sample, last, "rival", self._rivals), kept=kept)
-                self._rivals += 1
+                self._begin_rival(vehicle, known, sample, last)
                 known.passes += 1
             known.under_way = True
+        elif vehicle.rival is None and last is not None and vehicle.small_m >= _APART_M:
+            self._begin_rival(vehicle, known, sample, last)
         for other in self._vehicles.values():
             if other is not vehicle and other.anomaly is known:
                 other.rival = None  # without the other measurements its known anomaly can't be judged
         known.take(sample)
+
+    def _begin_rival(self, vehicle: _Vehicle, known: Anomaly, sample: Sample, last: Sample) -> None:
+        """Begin the alternative to a known anomaly with a measurement beyond the threshold."""
+        rival = self._new(sample, last, vehicle.threshold_nt, "rival", self._rivals)
+        vehicle.rival = _Rival(anomaly=rival, kept=copy.deepcopy(known))
+        self._rivals += 1
 
     def _discard_doubtful(self, vehicle: _Vehicle) -> None:
         """The level was wrong from its start: the anomalies since then are none."""
@@ -297,8 +329,8 @@ class Identifier:
         near = [entry for entry in found if entry[0] <= self._reach_m]
         return min(near)[2] if near else None
 
-    def _start(self, sample: Sample, last: Sample) -> Anomaly:
-        anomaly = self._new(sample, last, "anomaly", self.started)
+    def _start(self, sample: Sample, last: Sample, threshold_nt: float) -> Anomaly:
+        anomaly = self._new(sample, last, threshold_nt, "anomaly", self.started)
         self._add(anomaly)
         return anomaly
 
@@ -310,14 +342,14 @@ class Identifier:
         self.started += 1
         self.anomalies.append(anomaly)
 
-    def _new(self, sample: Sample, last: Sample, stream: str, index: int) -> Anomaly:
+    def _new(self, sample: Sample, last: Sample, threshold_nt: float, stream: str, index: int) -> Anomaly:
         return Anomaly(
             self.started,
             sample,
             self._parameters,
             self._classes,
             self._map_error,
-            threshold_nt=self._threshold_nt,
+            threshold_nt=threshold_nt,
             field_ned=self._field_ned,
             # as fast as PCG64 is, and faster for normal numbers, most of the cost of a step
             rng=np.random.Generator(np.random.SFC64(self._streams.child(stream, index))),

@@ -31,7 +31,8 @@ SIN: Final = _pose.place()
 POSE: Final = _pose.size
 
 _gaussian = Slots(POSE)
-SIZE: Final = _gaussian.place()  # factor of the extent
+PER_ALONG: Final = _gaussian.place()  # one over the standard deviation along the axis, 1/m
+PER_ACROSS: Final = _gaussian.place()
 AMPLITUDE: Final = _gaussian.place()  # mean of the amplitude, over the expected one
 MAP: Final = _gaussian.place()  # mean of the error of the map, nT
 AMPLITUDE_VAR: Final = _gaussian.place()
@@ -40,11 +41,14 @@ MAP_VAR: Final = _gaussian.place()
 GAUSSIAN: Final = _gaussian.size
 
 TERMS: Final = 4  # linear terms of a dipole: its strength north, east and down, and the error of the map
+COVARIANCES: Final = TERMS * (TERMS + 1) // 2
 _dipole = Slots(POSE)
 HEIGHT: Final = _dipole.place()  # of the dipole above the map's home
 RANGE: Final = _dipole.place()  # distance at which the strength is stated
 MEANS: Final = _dipole.place(TERMS)
-COVARIANCE: Final = _dipole.place(TERMS * TERMS)  # row by row
+COVARIANCE: Final = _dipole.place(COVARIANCES)  # the upper triangle, row by row: NN, NE, ND, NM, EE, ...
+STRENGTH_VARIANCES: Final = (COVARIANCE, COVARIANCE + 4, COVARIANCE + 7)
+DIPOLE_MAP_VAR: Final = COVARIANCE + COVARIANCES - 1
 DIPOLE: Final = _dipole.size
 
 _LOG_2PI: Final = math.log(2.0 * math.pi)
@@ -63,20 +67,22 @@ def move(
 ) -> None:
     """Motion model, equation 3: the control of a step with its noise, equation 4, for each particle.
 
-    Drawing normal numbers is most of the cost of a step. Each therefore serves two particles, with either
-    sign (antithetic variates, Hammersley and Morton 1956); resampling puts copies of one particle side by
-    side, so these two are seldom alike.
+    Drawing normal numbers is most of the cost of a step. Each pair therefore serves four particles, with
+    either sign of both (antithetic variates, Hammersley and Morton 1956); resampling puts copies of one
+    particle side by side, so these four are seldom alike.
 
     Args:
         particles: (width, n), changed in place.
         forward_m, right_m: displacement of the vehicle along and across its course before the step.
         turn_rad: change of its course.
-        noise: (2, half of n or more) standard normal.
+        noise: (2, a quarter of n or more) standard normal.
         forward_sigma_m, turn_sigma_rad: standard deviations of displacement and turn.
     """
     count = particles.shape[1]
-    half = (count + 1) // 2
-    for first, last, sign in ((0, half, 1.0), (half, count, -1.0)):
+    part = (count + 3) // 4
+    for number in range(4):
+        first, last = number * part, min(count, (number + 1) * part)
+        forward_sign, turn_sign = 1.0 - 2.0 * (number % 2), 1.0 - 2.0 * (number // 2)
         _move_part(
             particles[X, first:last],
             particles[Y, first:last],
@@ -85,7 +91,7 @@ def move(
             (forward_m, right_m),
             (math.cos(turn_rad), math.sin(turn_rad)),
             noise,
-            (forward_sigma_m * sign, turn_sigma_rad * sign),
+            (forward_sigma_m * forward_sign, turn_sigma_rad * turn_sign),
         )
 
 
@@ -131,13 +137,13 @@ def _move_part(
 def weigh_gaussian(
     particles: Array,
     weights: Array,
-    signature: Array,
+    amplitude_nt: float,
     measured_nt: float,
     white_nt2: float,
     decay: float,
     drive_nt2: float,
     fits: Array,
-) -> tuple[float, float]:
+) -> tuple[float, float, float]:
     """Update the particles of a Gaussian signature by a measurement: weights (5), (6), and linear factors.
 
     The exponential is the only part that is not vectorized, and therefore has a loop of its own.
@@ -145,24 +151,22 @@ def weigh_gaussian(
     Args:
         particles: (GAUSSIAN, n), changed in place.
         weights: (n,) before the measurement; after it, likewise with sum one.
-        signature: (3,) amplitude, nT, and standard deviations along and across, m.
+        amplitude_nt: what the particles' amplitudes are relative to.
         measured_nt: reading less map, less level.
         white_nt2: variance of the white noise of the measurement.
         decay, drive_nt2: of the error of the map since the last measurement: its factor, and the variance
             that is added.
-        fits: (2, n) to work in.
+        fits: (3, n) to work in.
 
     Returns:
         As `_next_weights`.
     """
-    per_along, per_across = 1.0 / signature[1], 1.0 / signature[2]
     terms = fits[0]
     for m in range(weights.size):
-        per_size = 1.0 / particles[SIZE, m]
-        along, across = particles[X, m] * per_along * per_size, particles[Y, m] * per_across * per_size
+        along, across = particles[X, m] * particles[PER_ALONG, m], particles[Y, m] * particles[PER_ACROSS, m]
         terms[m] = -0.5 * (along * along + across * across)
     for m in range(weights.size):
-        terms[m] = signature[0] * math.exp(terms[m])
+        terms[m] = amplitude_nt * math.exp(terms[m])
     for m in range(weights.size):
         term = fits[0, m]
         map_nt = decay * particles[MAP, m]
@@ -183,10 +187,11 @@ def weigh_gaussian(
         particles[MAP_VAR, m] = bb - gain_b * gain_b * per_total
         fits[0, m] = residual_nt * share
         fits[1, m] = total
+        fits[2, m] = residual_nt
     return _next_weights(weights, fits)
 
 
-@kernel
+@kernel(error_model="numpy")
 def weigh_dipole(
     particles: Array,
     weights: Array,
@@ -197,11 +202,12 @@ def weigh_dipole(
     decay: float,
     drive_nt2: float,
     fits: Array,
-) -> tuple[float, float]:
+) -> tuple[float, float, float]:
     """Update the particles of a dipole; its frame is north and east, as its moment has any direction.
 
     The anomaly is the part of B = mu_0 / 4 pi (3 (m r) r / r^5 - m / r^3) along the Earth's field (Blakely
-    1995, section 8.3): linear in the moment.
+    1995, section 8.3): linear in the moment. The Kalman filter is written out term by term, so that the
+    compiler vectorizes the loop.
 
     Args:
         particles: (DIPOLE, n), changed in place.
@@ -212,53 +218,76 @@ def weigh_dipole(
     Returns:
         As `_next_weights`.
     """
-    row, gains = np.ones(TERMS), np.empty(TERMS)
-    last = TERMS - 1
-    for m in range(particles.shape[1]):
+    field_n, field_e, field_d = field[0], field[1], field[2]
+    c = COVARIANCE
+    for m in range(weights.size):
         x, y = particles[X, m], particles[Y, m]
         up = max(1.0, height_m - particles[HEIGHT, m])
         distance2 = x * x + y * y + up * up
         reach = particles[RANGE, m]
         scale = reach * reach * reach / (distance2 * math.sqrt(distance2))
-        along = 3.0 * (x * field[0] + y * field[1] - up * field[2]) / distance2
-        row[0] = scale * (along * x - field[0])
-        row[1] = scale * (along * y - field[1])
-        row[2] = scale * (-along * up - field[2])
-        particles[MEANS + last, m] *= decay
-        for i in range(last):
-            particles[COVARIANCE + TERMS * i + last, m] *= decay
-            particles[COVARIANCE + TERMS * last + i, m] *= decay
-        corner = COVARIANCE + TERMS * last + last
-        particles[corner, m] = decay * decay * particles[corner, m] + drive_nt2
-        residual_nt, total = measured_nt, white_nt2
-        for i in range(TERMS):
-            gains[i] = 0.0
-            for j in range(TERMS):
-                gains[i] += particles[COVARIANCE + TERMS * i + j, m] * row[j]
-            residual_nt -= row[i] * particles[MEANS + i, m]
-            total += row[i] * gains[i]
-        for i in range(TERMS):
-            particles[MEANS + i, m] += gains[i] * residual_nt / total
-            for j in range(TERMS):
-                particles[COVARIANCE + TERMS * i + j, m] -= gains[i] * gains[j] / total
-        fits[0, m] = residual_nt * residual_nt / total
+        along = 3.0 * (x * field_n + y * field_e - up * field_d) / distance2
+        term_n = scale * (along * x - field_n)
+        term_e = scale * (along * y - field_e)
+        term_d = scale * (-along * up - field_d)
+        map_nt = decay * particles[MEANS + 3, m]
+        nn, ne, nd = particles[c, m], particles[c + 1, m], particles[c + 2, m]
+        ee, ed, dd = particles[c + 4, m], particles[c + 5, m], particles[c + 7, m]
+        nm, em, dm = decay * particles[c + 3, m], decay * particles[c + 6, m], decay * particles[c + 8, m]
+        mm = decay * decay * particles[c + 9, m] + drive_nt2
+        gain_n = term_n * nn + term_e * ne + term_d * nd + nm
+        gain_e = term_n * ne + term_e * ee + term_d * ed + em
+        gain_d = term_n * nd + term_e * ed + term_d * dd + dm
+        gain_m = term_n * nm + term_e * em + term_d * dm + mm
+        residual_nt = (
+            measured_nt
+            - term_n * particles[MEANS, m]
+            - term_e * particles[MEANS + 1, m]
+            - term_d * particles[MEANS + 2, m]
+            - map_nt
+        )
+        total = term_n * gain_n + term_e * gain_e + term_d * gain_d + gain_m + white_nt2
+        per_total = 1.0 / total
+        share = residual_nt * per_total
+        particles[MEANS, m] += gain_n * share
+        particles[MEANS + 1, m] += gain_e * share
+        particles[MEANS + 2, m] += gain_d * share
+        particles[MEANS + 3, m] = map_nt + gain_m * share
+        particles[c, m] = nn - gain_n * gain_n * per_total
+        particles[c + 1, m] = ne - gain_n * gain_e * per_total
+        particles[c + 2, m] = nd - gain_n * gain_d * per_total
+        particles[c + 3, m] = nm - gain_n * gain_m * per_total
+        particles[c + 4, m] = ee - gain_e * gain_e * per_total
+        particles[c + 5, m] = ed - gain_e * gain_d * per_total
+        particles[c + 6, m] = em - gain_e * gain_m * per_total
+        particles[c + 7, m] = dd - gain_d * gain_d * per_total
+        particles[c + 8, m] = dm - gain_d * gain_m * per_total
+        particles[c + 9, m] = mm - gain_m * gain_m * per_total
+        fits[0, m] = residual_nt * share
         fits[1, m] = total
+        fits[2, m] = residual_nt
     return _next_weights(weights, fits)
 
 
 @kernel(error_model="numpy")
-def _next_weights(weights: Array, fits: Array) -> tuple[float, float]:
+def _next_weights(weights: Array, fits: Array) -> tuple[float, float, float]:
     """Multiply the weights by the likelihoods, and normalize them.
 
     Args:
         weights: (n,), changed in place.
-        fits: (2, n) squared innovation over its variance, and that variance, nT^2.
+        fits: (3, n) squared innovation over its variance, that variance, nT^2, and the innovation, nT.
 
     Returns:
-        Logarithm of the measurement's density given those before it, 1/nT; and the paper's confidence (7),
-        each weight over its greatest possible value: the mean of exp(-fit / 2).
+        Logarithm of the measurement's density given those before it, 1/nT; the paper's confidence (7), each
+        weight over its greatest possible value: the mean of exp(-fit / 2); and the square of the difference
+        between measurement and prediction of all particles together, over its variance.
     """
     count = weights.size
+    mean = square = 0.0
+    for m in range(count):
+        mean += weights[m] * fits[2, m]
+        square += weights[m] * (fits[2, m] * fits[2, m] + fits[1, m])
+    misfit = mean * mean / (square - mean * mean)
     confidence = summed = 0.0
     for m in range(count):
         weights[m] *= math.exp(-0.5 * fits[0, m])
@@ -276,11 +305,11 @@ def _next_weights(weights: Array, fits: Array) -> tuple[float, float]:
             summed += weights[m] / count
         for m in range(count):
             weights[m] /= summed * count
-        return before + math.log(summed) - 0.5 * _LOG_2PI, confidence
+        return before + math.log(summed) - 0.5 * _LOG_2PI, confidence, misfit
     per_sum = 1.0 / summed
     for m in range(count):
         weights[m] *= per_sum
-    return math.log(summed) - 0.5 * _LOG_2PI, confidence
+    return math.log(summed) - 0.5 * _LOG_2PI, confidence, misfit
 
 
 @kernel

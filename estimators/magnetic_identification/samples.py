@@ -16,6 +16,7 @@ class Sample:
         course_rad: course of the vehicle over ground.
         residual_nt: mean of reading less map, less level.
         readings: number of readings.
+        excess_nt2: variance of the noise of the mean beyond that of stated readings, by the vehicle's track.
     """
 
     time_us: int
@@ -26,6 +27,7 @@ class Sample:
     course_rad: float
     residual_nt: float
     readings: int
+    excess_nt2: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -191,6 +191,7 @@ class AnomalyDetector:
         self._longest_us = longest_s * 1e6
         self._level_nt = math.nan
         self._level_began_us = -1
+        self._level_readings = 0
         self._time_us = -1
         self._began_us = -1
         self._peak: Anomaly | None = None
@@ -225,6 +226,7 @@ class AnomalyDetector:
             self.restarts += 1
         if math.isnan(self._level_nt):
             self._level_nt, self._level_began_us = difference_nt, time_us
+            self._level_readings = 0
         elapsed_us = 0 if self._time_us < 0 else time_us - self._time_us
         self._time_us = time_us
         residual_nt = self.residual_nt = difference_nt - self._level_nt
@@ -239,7 +241,10 @@ class AnomalyDetector:
             self._peak = self._grown(time_us, residual_nt, north_m, east_m)
             return None
         ended, self._peak = self._peak, None
-        self._level_nt += residual_nt * min(1.0, elapsed_us / self._level_time_us)
+        # the mean of all readings at first: the noise of the first one would be in the level for long
+        self._level_readings += 1
+        share = max(1.0 / self._level_readings, elapsed_us / self._level_time_us)
+        self._level_nt += residual_nt * min(1.0, share)
         if ended is None or ended.samples < self._least_samples:
             return None
         if not self._significant():

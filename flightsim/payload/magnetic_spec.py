@@ -61,6 +61,7 @@ class MagneticSpec(Options):
             error.
         daily: variation of the field in time; None: there is none but the drift of magnetometers.
         signatures: targets in the field; places are local NED of the map's home.
+        false_signatures: what else lies there, and is no target.
     """
 
     map_file: Path | None = None
@@ -72,6 +73,7 @@ class MagneticSpec(Options):
     exact_map: bool = False
     daily: DailyVariationParameters | None = None
     signatures: tuple[SignatureSpec, ...] = ()
+    false_signatures: tuple[SignatureSpec, ...] = ()
 
 
 def magnetic_field_of(
@@ -96,7 +98,9 @@ def magnetic_field_of(
     else:
         truth = _generated(spec, home, seed, decimal_year)
         published = truth if spec.exact_map else surveyed(truth, SurveyParameters(), seed=stream)
-    signatures = [_resolved(signature, truth, decimal_year) for signature in spec.signatures]
+    signatures = [
+        _resolved(signature, truth, decimal_year) for signature in (*spec.signatures, *spec.false_signatures)
+    ]
     daily = (
         None
         if spec.daily is None

@@ -1,8 +1,8 @@
 """Encounters with magnetic anomalies without flights: a world, straight passes, and the readings on them.
 
-Every encounter has a map and a source of its own, drawn from its seed. The field, the survey that publishes
-it and the sources are those of embedded worlds; the aircraft is a point with the errors of position and
-magnetometer.
+Every encounter has a map and a source of its own, drawn from its seed. The field and the survey that
+publishes it are those of embedded worlds, the sources those of `magnetic_sources`; the aircraft is a point
+with the errors of position and magnetometer.
 """
 
 import math
@@ -19,16 +19,15 @@ from flightsim.foundation.geodesy import GeodeticPosition
 from flightsim.foundation.random_streams import RandomStreams
 from flightsim.home import Home
 from flightsim.payload import (
-    DipoleSignature,
-    GaussianSignature,
     MagneticField,
     MagneticMap,
-    Signature,
     SurveyParameters,
     SyntheticMapParameters,
     surveyed,
     synthetic_map,
 )
+from missions.embedded.magnetic_sources import FalseSources, Source, false_source, target_source
+from missions.embedded.manoeuvre_noise import manoeuvre_noise
 
 __all__ = ["Encounter", "EncounterConditions", "as_published", "encounters"]
 
@@ -53,15 +52,23 @@ class EncounterConditions:
         offset_m: largest distance of a pass from the source.
         noise_nt: standard deviation of a reading, white, as it is stated.
         noise_factor: true noise over the stated one.
+        manoeuvre_nt: root mean square of what the aircraft's motion adds, which is not stated.
         depth_factor: distance to a target over that of its class: the extent of a Gaussian grows with it,
             and its amplitude falls with its cube, as of a dipole.
+        moment_factor: magnetic moment of a target over that of its class.
+        false_sources: kind of the false anomalies.
+        with_target: whether one of the two encounters is with a target; otherwise both are false anomalies.
         speed_m_s: ground speed.
     """
 
     offset_m: float = 80.0
     noise_nt: float = 0.3
     noise_factor: float = 1.0
+    manoeuvre_nt: float = 0.0
     depth_factor: float = 1.0
+    moment_factor: float = 1.0
+    false_sources: FalseSources = FalseSources.LIBRARY
+    with_target: bool = True
     speed_m_s: float = 25.0
 
 
@@ -83,7 +90,7 @@ class Encounter:
 
 
 def encounters(seed: int, conditions: EncounterConditions, *, passes: int = 2) -> Iterator[Encounter]:
-    """One encounter with a target and one with a false anomaly, on one map.
+    """One encounter with a target and one with a false anomaly, on one map; or two with false anomalies.
 
     Args:
         seed: of map, sources, passes and noise.
@@ -104,18 +111,24 @@ def encounters(seed: int, conditions: EncounterConditions, *, passes: int = 2) -
         seed=streams.child("magnetic_map"),
     )
     published = surveyed(truth, SurveyParameters(), seed=streams.child("magnetic_survey"))
-    for is_target in (True, False):
-        rng = streams.generator("encounter", int(is_target))
+    for first in (True, False):
+        is_target = first and conditions.with_target
+        rng = streams.generator("encounter", int(first))
         while True:
-            source = _target(rng, conditions) if is_target else _false_anomaly(rng, conditions)
+            if is_target:
+                source = target_source(
+                    rng, depth_factor=conditions.depth_factor, moment_factor=conditions.moment_factor
+                )
+            else:
+                source = false_source(rng, conditions.false_sources)
             flown = _passes(rng, source, conditions, passes)
-            field = MagneticField(truth, [source])
+            field = MagneticField(truth, source.signatures)
             if _peak_nt(field, truth, flown[0]) >= _LEAST_PEAK_NT:
                 break
         yield Encounter(
             is_target=is_target,
             survey_map=as_published(published),
-            place_ne_m=(source.north_m, source.east_m),
+            place_ne_m=source.place_ne_m,
             passes=tuple(
                 _readings(rng, field, places, conditions, start_s=k * (_TURN_S + 2.0 * _PASS_M / 25.0))
                 for k, places in enumerate(flown)
@@ -123,54 +136,12 @@ def encounters(seed: int, conditions: EncounterConditions, *, passes: int = 2) -
         )
 
 
-def _place(rng: np.random.Generator) -> tuple[float, float]:
-    north_m, east_m = rng.uniform(-400.0, 400.0, 2)
-    return float(north_m), float(east_m)
-
-
-def _target(rng: np.random.Generator, conditions: EncounterConditions) -> GaussianSignature:
-    """A target of the class 30 nT, 80 m and 60 m, with its spread."""
-    north_m, east_m = _place(rng)
-    size = math.exp(0.1 * rng.standard_normal()) * conditions.depth_factor
-    amplitude_nt = 30.0 * math.exp(0.15 * rng.standard_normal()) / conditions.depth_factor**3
-    return GaussianSignature(
-        north_m=north_m,
-        east_m=east_m,
-        amplitude_nt=amplitude_nt,
-        sigma_along_m=80.0 * size,
-        sigma_across_m=60.0 * size,
-        heading_rad=float(rng.uniform(-math.pi, math.pi)),
-    )
-
-
-def _false_anomaly(rng: np.random.Generator, conditions: EncounterConditions) -> Signature:
-    """Three of four are boats: dipoles near home's level, rather along the field. The others are wrecks,
-    whose anomaly is narrow.
-    """
-    north_m, east_m = _place(rng)
-    if rng.random() < 0.25:
-        return GaussianSignature(
-            north_m=north_m,
-            east_m=east_m,
-            amplitude_nt=float(rng.uniform(10.0, 50.0)),
-            sigma_along_m=35.0,
-            sigma_across_m=25.0,
-        )
-    direction = rng.standard_normal(3) + np.array([0.8, 0.0, 1.8])
-    along = 3e4 * 4.0 ** rng.random() * direction / np.linalg.norm(direction)
-    return DipoleSignature(
-        north_m=north_m,
-        east_m=east_m,
-        height_m=-float(rng.uniform(0.0, 10.0)),
-        moment_ned_a_m2=(float(along[0]), float(along[1]), float(along[2])),
-    )
-
-
 def _passes(
-    rng: np.random.Generator, source: Signature, conditions: EncounterConditions, count: int
+    rng: np.random.Generator, source: Source, conditions: EncounterConditions, count: int
 ) -> list[Array]:
     """Places (n, 2) of straight passes, the second and later ones across the one before."""
     heading = rng.uniform(-math.pi, math.pi)
+    north_m, east_m = source.place_ne_m
     found = []
     for _ in range(count):
         along_m = np.arange(-_PASS_M, _PASS_M, conditions.speed_m_s / _RATE_HZ)
@@ -178,8 +149,8 @@ def _passes(
         found.append(
             np.column_stack(
                 (
-                    source.north_m + along_m * math.cos(heading) - offset_m * math.sin(heading),
-                    source.east_m + along_m * math.sin(heading) + offset_m * math.cos(heading),
+                    north_m + along_m * math.cos(heading) - offset_m * math.sin(heading),
+                    east_m + along_m * math.sin(heading) + offset_m * math.cos(heading),
                 )
             )
         )
@@ -206,6 +177,8 @@ def _readings(
     drift_nt = 0.2 * rng.standard_normal() + 0.2 * rng.standard_normal() * elapsed_s / _DRIFT_S
     noise_nt = conditions.noise_nt * conditions.noise_factor
     total_nt = total_nt + drift_nt + noise_nt * rng.standard_normal(len(places))
+    if conditions.manoeuvre_nt:
+        total_nt = total_nt + conditions.manoeuvre_nt * manoeuvre_noise(rng, len(places), 1.0 / _RATE_HZ)
     reported = places + _POSITION_M * rng.standard_normal(2)
     return tuple(
         PlacedReading(

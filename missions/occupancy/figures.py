@@ -40,6 +40,7 @@ def search_figures(team: SearchTeam, debriefing: Debriefing) -> Mapping[str, Any
         "target_error_m": None if error_m is None else round(error_m, 2),
         **_naming(found is not None, error_m),
         "probability_of_detection": round(search.map.probability_of_detection, 5),
+        "no_target_probability": round(search.no_target_probability, 5),
         "heading_settled_error_95_deg": round(math.degrees(max(known)), 3) if known else None,
         "least_separation_m": _rounded(
             least_separation_m(debriefing.records, [notes.system_id for notes, _ in debriefing.flights])

@@ -11,12 +11,13 @@ from estimators.occupancy.detection import MapError
 from estimators.occupancy.placed_readings import PlacedReading
 from estimators.tracking.grid import GridLayout
 from missions.occupancy.assignment import PassAssignment
+from missions.occupancy.candidate import Candidate
 from missions.occupancy.parameters import Identify
-from missions.occupancy.suspect import ACCEPT, Suspect, Verdict
+from missions.occupancy.suspect import ACCEPT, DISMISS, Suspect, Verdict
 
 __all__ = ["Investigation"]
 
-_DISMISS: Final = 0.03
+_CERTAIN: Final = 1.0 - 1e-9
 _REOPEN: Final = 0.3  # a dismissed suspect is open again beyond it, after a pass that happened to be near
 _PLACED_WITHIN_M: Final = 40.0  # of the place of a target that is named, with the probability below
 _PLACED: Final = 0.9
@@ -41,6 +42,7 @@ class Investigation:
         layout: GridLayout,
         noise_nt: float,
         map_error: MapError,
+        target_prior: float,
     ) -> None:
         """Begin without suspects.
 
@@ -51,10 +53,12 @@ class Investigation:
             layout: cells of the searched area, in which the target is.
             noise_nt: standard deviation of a measurement.
             map_error: error of the published map.
+            target_prior: probability of a target that the identification begins with.
         """
         self.identifier = identifier
         self.suspects: dict[int, Suspect] = {}
         self.identify = identify
+        self._target_prior = target_prior
         self._layout = layout
         self._passes = PassAssignment(searchers, noise_nt=noise_nt, map_error=map_error)
 
@@ -117,6 +121,14 @@ class Investigation:
         self._passes.assign_waiting(self.suspects.values())
         return suspect
 
+    def evidence_of(self, candidate: Candidate | Suspect) -> float:
+        """How much more probable its measurements are if a candidate is a target than if it is none."""
+        if not isinstance(candidate, Suspect):
+            return 1.0
+        probability = min(candidate.probability, _CERTAIN)
+        prior = self._target_prior
+        return probability / (1.0 - probability) * (1.0 - prior) / prior
+
     def flies_pass(self, searcher: int) -> bool:
         """Whether a searcher is assigned a pass."""
         return self._passes.flies_pass(searcher)
@@ -159,7 +171,7 @@ class Investigation:
             last_chance and inside and suspect.probability >= 0.5
         ):
             suspect.verdict = Verdict.TARGET
-        elif suspect.probability <= _DISMISS or last_chance:
+        elif suspect.probability <= DISMISS or last_chance:
             suspect.verdict = Verdict.DISMISSED
         elif suspect.probability >= _REOPEN:
             suspect.verdict = Verdict.OPEN

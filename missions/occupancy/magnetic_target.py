@@ -17,6 +17,9 @@ class MagneticTarget(PlanOptions):
         varies="drawn from `seed`",
         help="Place of the target, m from the map's home.",
     )
+    absent: bool = option(
+        False, name="no-target", help="Area without a target, with its boats and wrecks only."
+    )
     amplitude_nt: float = option(30.0, help="Amplitude of the target's Gaussian anomaly.")
     sigma_along_m: float = option(
         80.0,

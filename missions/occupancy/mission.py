@@ -116,7 +116,8 @@ def _lines(figures: Mapping[str, Any]) -> Sequence[str]:
     )
     detected = f"probability of detection {figures['probability_of_detection']:.2f}"
     if not figures["target_found"]:
-        return (f"target not found, {detected}", *broken)
+        none = f"probability {figures['no_target_probability']:.2f} that there is none"
+        return (f"nothing found, {detected}, {none}", *broken)
     error_m = figures["target_error_m"]
     off = "" if error_m is None else f", {error_m:.0f} m off"
     return (f"target found after {figures['time_to_find_s']:.0f} s{off}, {detected}", *broken)

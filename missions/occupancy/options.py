@@ -64,6 +64,7 @@ class OccupancyOptions(MissionOptions):
         detection_range="detection_range_m",
         confirmations=Shown(fields=("confirmations",), needs=("identify", ("threshold",))),
         raise_radius="raise_radius_m",
+        no_target_prior="no_target_prior",
     )
     search_time_s: float = option(
         900.0, above=0.0, most=MAX_SEARCH_TIME_S, help="Time after which the search is given up."

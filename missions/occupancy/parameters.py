@@ -50,3 +50,6 @@ class SearchParameters(PlanOptions):
         2, least=1, help="Passes that must detect an anomaly at one place, with `identify=threshold`."
     )
     same_place_m: float = option(180.0, above=0.0, help="Distance within which anomalies count as one.")
+    no_target_prior: float = option(
+        0.2, least=0.0, below=1.0, help="Probability, before the search, that the area has no target."
+    )

@@ -79,6 +79,23 @@ class Search:
         self._snapshots = Snapshots(snapshot_interval_s)
 
     @property
+    def no_target_probability(self) -> float:
+        """Probability that there is no target in the area, by what the team has and has not detected.
+
+        A target would have been missed with the probability that the map states, or it is one of the
+        candidates, each of which would as soon be it; the evidence of a candidate is the ratio of the odds
+        that it is a target after and before its measurements. A candidate that counts by threshold has none.
+        """
+        prior = self.parameters.no_target_prior
+        detected = self.map.probability_of_detection
+        ratios = [
+            1.0 if self.investigation is None else self.investigation.evidence_of(candidate)
+            for candidate in self.candidates
+        ]
+        present = 1.0 - detected + (detected * sum(ratios) / len(ratios) if ratios else 0.0)
+        return prior / (prior + (1.0 - prior) * present)
+
+    @property
     def snapshots(self) -> list[Snapshot]:
         """The map after anomalies and at even intervals."""
         return self._snapshots.kept

@@ -8,10 +8,12 @@ from estimators.magnetic_identification.anomaly import Anomaly
 from estimators.magnetic_identification.samples import LikelyPlace
 from estimators.occupancy import detection
 
-__all__ = ["ACCEPT", "Suspect", "Verdict"]
+__all__ = ["ACCEPT", "DISMISS", "Suspect", "Verdict"]
 
 ACCEPT: Final = 0.97
 """From this probability on a suspect is the target, if its place is known."""
+DISMISS: Final = 0.03
+"""Up to this probability a suspect is not the target."""
 
 
 class Verdict(StrEnum):

@@ -248,6 +248,7 @@ def investigation_of(options: Sequence[OccupancyOptions], survey_map: SurveyMap)
         layout=layout_of(first),
         noise_nt=first.identification.noise_nt,
         map_error=map_error,
+        target_prior=first.identification.target_prior,
     )
 
 

@@ -33,7 +33,7 @@ def occupancy_world(
     Args:
         world: the rest of the world; a magnetic field that it has stays as it is.
         options: the search. Its map is the world's; without one, a map is generated around the area.
-        hidden: the target, and what else lies in the area.
+        hidden: the target, and what else lies in the area. Without the target, all else is as with it.
 
     Raises:
         PlanError: a target that is impossible, outside the area, or too weak to be found.
@@ -65,10 +65,8 @@ def occupancy_world(
         width_m=options.width_m + 2.0 * (abs(centre_e_m) + margin_m),
         height_m=options.height_m + 2.0 * (abs(centre_n_m) + margin_m),
         survey_height_m=options.altitude_m,
-        signatures=(
-            signature,
-            *drawn_false_anomalies(options, world.seed, hidden.false_count, (north_m, east_m)),
-        ),
+        signatures=() if hidden.absent else (signature,),
+        false_signatures=drawn_false_anomalies(options, world.seed, hidden.false_count, (north_m, east_m)),
     )
     return replace(world, magnetic_field=field)
 

@@ -46,19 +46,21 @@ class PointSearch:
 
     Attributes:
         search: the team's.
-        target_ne_m: true place of the target.
+        target_ne_m: true place of the target; None: there is none.
         time_s: time at which something was named, or the search time.
     """
 
     search: Search
-    target_ne_m: tuple[float, float]
+    target_ne_m: tuple[float, float] | None
     time_s: float
 
     @property
     def error_m(self) -> float:
-        """Distance of what was named from the target; NaN: nothing was named."""
+        """Distance of what was named from the target; NaN: nothing was named; infinite: there is none."""
         found = self.search.found
-        return math.nan if found is None else math.dist(found.place_ne_m, self.target_ne_m)
+        if found is None:
+            return math.nan
+        return math.inf if self.target_ne_m is None else math.dist(found.place_ne_m, self.target_ne_m)
 
 
 class _Point:
@@ -138,13 +140,16 @@ class _Point:
             self._search.report_anomaly(self._index, anomaly, time_us)
 
 
-def search_with_points(options: OccupancyOptions, seed: int, *, false_count: int) -> PointSearch:
+def search_with_points(
+    options: OccupancyOptions, seed: int, *, false_count: int, absent: bool = False
+) -> PointSearch:
     """Search until something is named, or until the search time is over.
 
     Args:
         options: of the team.
         seed: of the world, which is that of `fly occupancy` with this seed, and of the noise.
         false_count: number of false anomalies.
+        absent: whether there is no target.
 
     Raises:
         PlanError: impossible options.
@@ -155,7 +160,9 @@ def search_with_points(options: OccupancyOptions, seed: int, *, false_count: int
         for k in range(options.vehicles)
     ]
     spec = occupancy_world(
-        WorldSpec.of_team(options.vehicles, seed=seed), options, MagneticTarget(false_count=false_count)
+        WorldSpec.of_team(options.vehicles, seed=seed),
+        options,
+        MagneticTarget(absent=absent, false_count=false_count),
     ).magnetic_field
     assert isinstance(spec, MagneticSpec)
     field, published = magnetic_field_of(spec, home=Home(), seed=seed, decimal_year=_YEAR)
@@ -179,6 +186,6 @@ def search_with_points(options: OccupancyOptions, seed: int, *, false_count: int
         if search.found is not None:
             break
     search.finish(round(1e6 * options.search_time_s))
-    target_ne_m, _ = drawn_target(options, seed)
+    target_ne_m = None if absent else drawn_target(options, seed)[0]
     time_s = options.search_time_s if search.found is None else search.found_us * 1e-6
     return PointSearch(search=search, target_ne_m=target_ne_m, time_s=time_s)

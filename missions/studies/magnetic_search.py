@@ -6,7 +6,9 @@ search takes seconds, or they fly: a trial is then the flight of that command.
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
@@ -24,12 +26,22 @@ from missions.studies.flights import fly_trial
 from missions.studies.options import MagneticStudyOptions
 from missions.studies.results import Results
 from missions.studies.study import Study
+from missions.studies.worlds import NOMINAL, World, chosen_worlds
 from missions.worlds.defaults import default_world
 
 __all__ = ["MagneticSearchCell", "SearchRow", "study"]
 
 VEHICLES: Final = 3
 FALSE_ANOMALIES: Final = 5
+WORLDS: Final[Mapping[str, World[bool]]] = MappingProxyType(
+    {
+        "nominal": World(setting=True),
+        "no-target": World(
+            setting=False, differs="there is no target", source="a search where the target is not"
+        ),
+    }
+)
+"""By name; the setting is whether there is a target."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,9 +50,11 @@ class MagneticSearchCell:
 
     Attributes:
         identify: a value of `Identify`.
+        world: one of `WORLDS`.
     """
 
     identify: str
+    world: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,6 +67,7 @@ class SearchRow:
         time_s: until something was named; the search time if nothing was.
         error_m: of the named place; NaN: none was named.
         passes: that were flown on purpose.
+        no_target_probability: stated at the end.
         reason: why a flight did not complete or failed its checks; "" otherwise.
     """
 
@@ -61,13 +76,15 @@ class SearchRow:
     time_s: float
     error_m: float
     passes: int
+    no_target_probability: float
     reason: str = ""
 
 
 def trial(cell: MagneticSearchCell, seed: int) -> SearchRow:
     """One search by points."""
     options = _options(cell)
-    done = search_with_points(options, seed, false_count=FALSE_ANOMALIES)
+    absent = not WORLDS[cell.world].setting
+    done = search_with_points(options, seed, false_count=FALSE_ANOMALIES, absent=absent)
     investigation, error_m = done.search.investigation, done.error_m
     return SearchRow(
         target_named=error_m <= NAMED_WITHIN_M,
@@ -75,6 +92,7 @@ def trial(cell: MagneticSearchCell, seed: int) -> SearchRow:
         time_s=done.time_s,
         error_m=error_m,
         passes=0 if investigation is None else investigation.passes_assigned,
+        no_target_probability=done.search.no_target_probability,
     )
 
 
@@ -82,16 +100,19 @@ def flight(cell: MagneticSearchCell, seed: int) -> SearchRow:
     """One search by aircraft."""
     options = _options(cell)
     world = default_world(OccupancyMission.world_defaults, count=VEHICLES, seed=seed)
-    world = occupancy_world(world, options, MagneticTarget(false_count=FALSE_ANOMALIES))
+    world = occupancy_world(
+        world, options, MagneticTarget(absent=not WORLDS[cell.world].setting, false_count=FALSE_ANOMALIES)
+    )
     result = fly_trial(OccupancyMission(), RunRequest(options=options, world=world))
     summary = result.summary
     time_s, error_m = summary["time_to_find_s"], summary["target_error_m"]
     return SearchRow(
-        target_named=summary["target_named"],
-        false_anomaly_named=summary["false_anomaly_named"],
+        target_named=summary.get("target_named", False),
+        false_anomaly_named=summary["target_found"] and not summary.get("target_named", False),
         time_s=options.search_time_s if time_s is None else time_s,
         error_m=math.nan if error_m is None else error_m,
         passes=summary.get("passes_assigned", 0),
+        no_target_probability=summary["no_target_probability"],
         reason=result.reason,
     )
 
@@ -107,14 +128,17 @@ def summarise(results: Results) -> dict[str, Any]:
     """
     named = results.values("target_named") > 0.0
     wrong = results.values("false_anomaly_named") > 0.0
+    none = results.values("no_target_probability")
     never_s = np.where(named, results.values("time_s"), math.inf)
     blocks: dict[str, Any] = {}
     for k, cell in enumerate(results.cells):
         ended = results.finished[k]
         if not ended.any():
             continue
-        blocks[str(cell["identify"])] = block = {
+        blocks[_name(cell)] = block = {
             "searches": int(ended.sum()),
+            "nothing_found": int(np.sum(ended & ~named[k] & ~wrong[k])),
+            "no_target_probability_median": _finite(float(np.median(none[k, ended]))),
             "target_named": round(float(named[k, ended].mean()), 4),
             "false_anomaly_named": round(float(wrong[k, ended].mean()), 4),
             "time_s_median": _finite(float(np.median(never_s[k, ended]))),
@@ -123,7 +147,8 @@ def summarise(results: Results) -> dict[str, Any]:
             else None,
         }
         pairs = ended & results.finished[0]
-        if results.cells[0]["identify"] == Identify.THRESHOLD and pairs.any():
+        alike = cell["world"] == results.cells[0]["world"]
+        if alike and results.cells[0]["identify"] == Identify.THRESHOLD and pairs.any():
             both = named[k] & named[0]
             later_s = results.values("time_s")[k, both] - results.values("time_s")[0, both]
             block |= {
@@ -137,32 +162,41 @@ def summarise(results: Results) -> dict[str, Any]:
     return {"searches": blocks}
 
 
+def _name(cell: Mapping[str, Any]) -> str:
+    """Name of a cell: its way of identification, and its world where that is not the nominal one."""
+    way, world = str(cell["identify"]), str(cell["world"])
+    return way if world == NOMINAL else f"{way}, {world}"
+
+
 def _finite(value: float) -> float | None:
     return round(value, 2) if math.isfinite(value) else None
 
 
-def _shown(value: float | None) -> str:
-    return "-" if value is None else f"{value:.1f}"
+def _shown(value: float | None, digits: int = 1) -> str:
+    return "-" if value is None else f"{value:.{digits}f}"
 
 
 def report(results: Results) -> list[str]:
     """The table of the command line."""
-    titles = ("runs", "target", "false", "time, s", "error, m", "pairs", "later, s")
-    lines = [f"{'identify':10s}" + "".join(f"{title:>10s}" for title in titles)]
+    titles = ("runs", "target", "false", "nothing", "p(none)", "time, s", "error, m", "pairs", "later, s")
+    lines = [f"{'identify':20s}" + "".join(f"{title:>10s}" for title in titles)]
     for name, block in summarise(results)["searches"].items():
         columns = (
             f"{block['searches']}",
             f"{block['target_named']:.3f}",
             f"{block['false_anomaly_named']:.3f}",
+            f"{block['nothing_found']}",
+            _shown(block["no_target_probability_median"], 2),
             _shown(block["time_s_median"]),
             _shown(block["error_m_median"]),
             f"{block.get('pairs_that_both_name_it', '-')}",
             _shown(block.get("time_to_threshold_s_median_of_pairs")),
         )
-        lines.append(f"{name:10s}" + "".join(f"{column:>10s}" for column in columns))
+        lines.append(f"{name:20s}" + "".join(f"{column:>10s}" for column in columns))
     return [
         *lines,
         "target, false: shares of the searches that name the target, or something else",
+        "nothing, p(none): searches that found nothing; median probability that there is no target",
         "time: median of all searches; the time of a search that does not name the target is infinite",
         "later: time after the search by the threshold with the same seed, median of the pairs in which both "
         "name the target",
@@ -176,6 +210,7 @@ def study(options: MagneticStudyOptions | None = None) -> Study[MagneticSearchCe
         options: None: the defaults.
     """
     o = options or MagneticStudyOptions()
+    worlds = chosen_worlds(o.world, WORLDS)
     compared = [way.value for way in Identify if way in o.identify]
     return Study(
         name="magnetic-search",
@@ -183,12 +218,12 @@ def study(options: MagneticStudyOptions | None = None) -> Study[MagneticSearchCe
         trial=flight if o.flights else trial,
         parameters=MagneticSearchCell,
         row=SearchRow,
-        design=grid(identify=compared),
+        design=grid(world=worlds) * grid(identify=compared),
         runs=100,
         success="target_named",
         metrics=("time_s", "error_m", "passes"),
         baseline=0,
-        options={"flights": o.flights},
+        options={"world": ",".join(worlds), "flights": o.flights},
         summarise=summarise,
         report=report,
     )

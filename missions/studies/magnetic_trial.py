@@ -1,9 +1,8 @@
 """One trial of the study `magnetic-identification`: passes over a target and a false anomaly of one map."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Final
 
 import numpy as np
@@ -13,25 +12,12 @@ from estimators.magnetic_identification.classifier import FEATURES, trace_featur
 from estimators.magnetic_identification.estimator import field_direction
 from estimators.magnetic_identification.identifier import Identifier
 from estimators.magnetic_identification.parameters import IdentificationParameters
-from estimators.occupancy.survey_map import map_error_of
-from missions.embedded.magnetic_encounters import Encounter, EncounterConditions, encounters
+from estimators.occupancy.survey_map import SurveyMap, map_error_of
+from missions.embedded.magnetic_encounters import Encounter, encounters
+from missions.studies.magnetic_worlds import WORLDS
 
-__all__ = ["CONDITIONS", "PASSES", "EncounterRow", "MagneticCell", "anomalies_of", "trial"]
+__all__ = ["PASSES", "EncounterRow", "MagneticCell", "anomalies_of", "identifier_of", "trial"]
 
-CONDITIONS: Final[Mapping[str, EncounterConditions]] = MappingProxyType(
-    {
-        "nominal": EncounterConditions(),
-        "offset": EncounterConditions(offset_m=104.0),
-        "noise": EncounterConditions(noise_factor=1.3),
-        "depth": EncounterConditions(depth_factor=1.3),
-        "all": EncounterConditions(offset_m=104.0, noise_factor=1.3, depth_factor=1.3),
-        "far": EncounterConditions(offset_m=150.0),
-        "noisy": EncounterConditions(noise_nt=1.0),
-    }
-)
-"""By name: passes up to 30 % farther off, 30 % more noise than stated, targets 30 % deeper than their class,
-all three; passes up to 150 m off, and three times the noise, as stated.
-"""
 PASSES: Final = 2
 _YEAR: Final = 2026.0
 _NEAR_M: Final = 300.0  # an anomaly farther from the source is another one
@@ -43,16 +29,16 @@ class MagneticCell:
     """A cell of the design.
 
     Attributes:
-        condition: one of `CONDITIONS`.
+        world: one of `WORLDS`.
     """
 
-    condition: str
+    world: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EncounterRow:
-    """Figures after each pass over a target, then after each pass over a false anomaly; NaN: no anomaly was
-    detected there.
+    """Figures after each pass over a target, or over a false anomaly in a world without targets, then after
+    each pass over a false anomaly; NaN: no anomaly was detected there.
 
     Attributes:
         detected: number of the sources, of two, at which an anomaly was detected.
@@ -75,7 +61,7 @@ class EncounterRow:
 
 def trial(cell: MagneticCell, seed: int) -> EncounterRow:
     """One map, one target, one false anomaly."""
-    conditions = CONDITIONS[cell.condition]
+    conditions = WORLDS[cell.world].setting
     figures = [
         after_pass
         for encounter in encounters(seed, conditions, passes=PASSES)
@@ -106,16 +92,21 @@ def figures_of_passes(encounter: Encounter, seed: int, *, noise_nt: float) -> li
 def anomalies_of(encounter: Encounter, seed: int, *, noise_nt: float) -> Iterator[Anomaly | None]:
     """The anomaly at the source after each pass; None: no anomaly was detected there."""
     survey_map = encounter.survey_map
-    identifier = Identifier(
-        IdentificationParameters(noise_nt=noise_nt, particles=_PARTICLES, seed=seed),
-        map_error=map_error_of(survey_map),
-        field_ned=field_direction(survey_map.home, _YEAR),
-    )
+    identifier = identifier_of(survey_map, seed, noise_nt=noise_nt)
     for readings in encounter.passes:
         for reading in readings:
             map_nt = survey_map.total_nt(reading.north_m, reading.east_m, reading.height_m)
             identifier.take(1, reading, map_nt)
         yield _at(identifier, encounter.place_ne_m)
+
+
+def identifier_of(survey_map: SurveyMap, seed: int, *, noise_nt: float) -> Identifier:
+    """The identification of an encounter: all that it knows of it is the published map."""
+    return Identifier(
+        IdentificationParameters(noise_nt=noise_nt, particles=_PARTICLES, seed=seed),
+        map_error=map_error_of(survey_map),
+        field_ned=field_direction(survey_map.home, _YEAR),
+    )
 
 
 def _at(identifier: Identifier, place_ne_m: tuple[float, float]) -> Anomaly | None:

@@ -11,6 +11,7 @@ from missions.multi_target.options import MultiTargetOptions
 from missions.occupancy.parameters import Identify
 from missions.search.planner_parameters import PlannerParameters
 from missions.studies.multi_target_worlds import SearchWorlds
+from missions.studies.worlds import MISMATCHED, NOMINAL
 
 TIMEOUT_S: Final = 900.0  # paper: 15 minutes
 
@@ -123,6 +124,34 @@ class Points(StrEnum):
     PIXELS = "pixels"
 
 
+class MagneticWorlds(StrEnum):
+    """Worlds of the study `magnetic-identification`."""
+
+    NOMINAL = NOMINAL
+    MISMATCHED = MISMATCHED  # all that follow
+    WIDE = "wide"
+    RIDGE = "ridge"
+    DEEP = "deep"
+    DIPOLES = "dipoles"
+    MANOEUVRE = "manoeuvre"
+    HALF_MOMENT = "half-moment"
+    NO_TARGET = "no-target"
+    OFFSET = "offset"
+    NOISE = "noise"
+    DEPTH = "depth"
+    ALL = "all"
+    FAR = "far"
+    NOISY = "noisy"
+
+
+class MagneticSearchWorlds(StrEnum):
+    """Worlds of the study `magnetic-search`."""
+
+    NOMINAL = NOMINAL
+    MISMATCHED = MISMATCHED  # all that follow
+    NO_TARGET = "no-target"
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HandoffStudyOptions(PlanOptions):
     """Options of the study `handoff`."""
@@ -179,6 +208,10 @@ class LissajousStudyOptions(PlanOptions):
 class IdentificationStudyOptions(PlanOptions):
     """Options of the study `magnetic-identification`."""
 
+    world: tuple[MagneticWorlds, ...] = option(
+        (MagneticWorlds.NOMINAL, MagneticWorlds.MISMATCHED),
+        help="World of the encounters: nominal, one by name, or mismatched for all others; repeat.",
+    )
     train: bool = option(
         False, help="Fit of the classifier to the rows (needs the extra learn), in classifier.toml."
     )
@@ -189,6 +222,9 @@ class MagneticStudyOptions(PlanOptions):
     """Options of the study `magnetic-search`."""
 
     identify: tuple[Identify, ...] = option(tuple(Identify), help="Ways that are compared; repeat.")
+    world: tuple[MagneticSearchWorlds, ...] = option(
+        (MagneticSearchWorlds.NOMINAL,), help="World of the searches: with a target, or without one; repeat."
+    )
     flights: bool = option(False, help="Flights of fly occupancy in place of points.")
 
 

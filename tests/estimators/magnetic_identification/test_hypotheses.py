@@ -45,8 +45,8 @@ def put(hypothesis, *, y_m, **places):
 
 def density_of(hypothesis, values):
     """Logarithm of the density of all measurements, by the filter's steps."""
-    total = hypothesis.step(straight(0.0), measurement(values[0]))[0]
-    return total + sum(hypothesis.step(straight(STEP_M), measurement(v))[0] for v in values[1:])
+    total = hypothesis.step(straight(0.0), measurement(values[0])).log_density
+    return total + sum(hypothesis.step(straight(STEP_M), measurement(v)).log_density for v in values[1:])
 
 
 def test_the_evidence_of_a_gaussian_is_the_density_of_all_measurements_together():
@@ -56,7 +56,8 @@ def test_the_evidence_of_a_gaussian_is_the_density_of_all_measurements_together(
     put(
         hypothesis,
         y_m=25.0,
-        SIZE=1.0,
+        PER_ALONG=1.0 / 80.0,
+        PER_ACROSS=1.0 / 60.0,
         AMPLITUDE=1.0,
         MAP=0.0,
         AMPLITUDE_VAR=0.04,
@@ -75,8 +76,9 @@ def test_the_evidence_of_a_dipole_is_the_density_of_all_measurements_together():
     hypothesis.start(measurement(3.0), MAP_NT**2)
     hypothesis.particles[p.MEANS : p.DIPOLE] = 0.0
     put(hypothesis, y_m=-30.0, HEIGHT=0.0, RANGE=HEIGHT_M)
-    for k, variance in enumerate((100.0, 100.0, 100.0, MAP_NT**2)):
-        hypothesis.particles[p.COVARIANCE + 5 * k] = variance
+    for diagonal in p.STRENGTH_VARIANCES:
+        hypothesis.particles[diagonal] = 100.0
+    hypothesis.particles[p.DIPOLE_MAP_VAR] = MAP_NT**2
     # the simulator's dipole; in a field this strong only its part along the field changes the magnitude
     moment = HEIGHT_M**3 / 100.0
     terms = np.array(
@@ -96,7 +98,7 @@ def test_the_evidence_without_a_signature_is_that_of_the_process():
     values = np.random.default_rng(4).standard_normal(COUNT)
     hypothesis = ShapelessHypothesis(MAP_NT)
     total = hypothesis.start(measurement(values[0]), MAP_NT**2)
-    total += sum(hypothesis.step(straight(STEP_M), measurement(v))[0] for v in values[1:])
+    total += sum(hypothesis.step(straight(STEP_M), measurement(v)).log_density for v in values[1:])
     assert total == pytest.approx(multivariate_normal(np.zeros(COUNT), map_covariance()).logpdf(values))
 
 

@@ -9,6 +9,7 @@ import pytest
 
 from estimators.errors import EstimatorError
 from estimators.occupancy.survey_map import SurveyMap
+from estimators.survey.anomalies import Search, line_peaks
 from estimators.survey.estimator import SurveyEstimator, SurveyEstimatorParameters
 from estimators.survey.export import ANOMALIES, LINE_DATA, LINE_DATA_XYZ, LINES, MAP, survey_files
 from estimators.survey.levelling import Crossing, levelled
@@ -151,6 +152,50 @@ def test_a_dipole_is_one_anomaly_with_its_place_depth_and_moment(seed):
     assert anomaly.source.height_m == pytest.approx(-5.0, abs=25.0)
     assert anomaly.source.moment_a_m2 == pytest.approx(math.hypot(2e4, 1e4, 7e4), rel=0.4)
     assert result.differential_noise_nt == pytest.approx(NOISE_NT, rel=0.1)
+
+
+def test_an_offset_of_all_readings_is_not_in_the_levelled_ones():
+    """The magnetometer reads 37 nT too much: the datum is that of the map."""
+    readings = flown(1)
+    high = replace(readings, total_nt=readings.total_nt + 37.0)
+    result = processed(high, published(), map_error_nt=0.0)
+    on = result.on_lines
+    assert float(np.median(result.differential_nt[on])) == pytest.approx(0.0, abs=1e-6)
+    level = result.levelled_nt[on] - processed(readings, published(), map_error_nt=0.0).levelled_nt[on]
+    np.testing.assert_allclose(level, 0.0, atol=1e-6)
+    assert result.grid is not None
+    north, east = np.meshgrid(result.grid.north_m, result.grid.east_m, indexing="ij")
+    on_map = published().totals_nt(north.ravel(), east.ravel(), np.full(north.size, HEIGHT_M))
+    assert float(np.nanmedian(result.grid.values_nt.ravel() - on_map)) == pytest.approx(0.0, abs=0.1)
+
+
+def test_a_target_on_the_first_line_is_seen_by_that_line():
+    """The number of the first line is 0: each of the lines counts, also where a number is a truth value."""
+    north_m, east_m = 100.0, plan().lines[0].start_ne_m[1]
+    target = DipoleSignature(north_m=north_m, east_m=east_m, height_m=-5.0, moment_ned_a_m2=(2e4, -1e4, 7e4))
+    result = processed(flown(1, target=target), published(), map_error_nt=0.0)
+    (anomaly,) = result.anomalies
+    assert 0 in anomaly.lines
+    assert anomaly.source is not None
+    assert math.dist((anomaly.north_m, anomaly.east_m), (north_m, east_m)) < 15.0
+    first = Search(
+        lines=(0,),
+        line_of=np.where(result.line_of == 0, 0, -1),
+        north_m=result.readings.north_m,
+        east_m=result.readings.east_m,
+        height_m=result.readings.height_m,
+        differential_nt=result.differential_nt,
+        direction_ned=MAIN.direction_ned,
+    )
+    assert first.lines_near(north_m, east_m, 150.0) == [0]
+    peaks = line_peaks(
+        0, *(column[result.line_of == 0] for column in (
+            result.readings.time_s, result.readings.north_m, result.readings.east_m, result.differential_nt
+        )), noise_nt=NOISE_NT,
+    )  # fmt: skip
+    source = first.dipole_at(max(peaks, key=lambda peak: peak.ratio), result.differential_nt)
+    assert source is not None
+    assert math.dist((source.north_m, source.east_m), (north_m, east_m)) < 60.0
 
 
 def test_the_error_of_a_map_is_no_anomaly_where_the_map_states_it():

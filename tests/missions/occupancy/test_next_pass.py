@@ -39,7 +39,13 @@ def search(identify=Identify.BAYES, searchers=2, *, south_m=-800.0):
         [DecisionParameters()] * searchers,
         noise_nt=0.2,
         investigation=Investigation(
-            identify, identifier, searchers=searchers, layout=layout, noise_nt=0.2, map_error=MAP_ERROR
+            identify,
+            identifier,
+            searchers=searchers,
+            layout=layout,
+            noise_nt=0.2,
+            map_error=MAP_ERROR,
+            target_prior=0.5,
         ),
     )
 

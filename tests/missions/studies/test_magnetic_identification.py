@@ -2,6 +2,7 @@
 
 import math
 import tomllib
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,20 +16,83 @@ from estimators.magnetic_identification.classifier import (
 )
 from estimators.magnetic_identification.samples import TracePoint
 from missions.embedded.magnetic_encounters import EncounterConditions, encounters
+from missions.embedded.magnetic_sources import FalseSources, false_source
+from missions.embedded.manoeuvre_noise import manoeuvre_noise
 from missions.studies import run_trial
 from missions.studies.magnetic_figures import draw_passes
-from missions.studies.magnetic_identification import area_under_curve, study
+from missions.studies.magnetic_identification import _verdicts, area_under_curve, study
 from missions.studies.magnetic_passes import TARGET, diagonal_pass, pass_traces
 from missions.studies.magnetic_training import fitted_tables, write_tables
+from missions.studies.magnetic_trial import identifier_of
+from missions.studies.magnetic_worlds import WORLDS
+from missions.studies.options import IdentificationStudyOptions, MagneticWorlds
 
 
 def test_a_trial_repeats_itself_and_tells_its_target_from_its_false_anomaly():
     first, again = (run_trial(study(), 0, runs=2) for _ in range(2))
     assert first == again
-    assert first["condition"] == "nominal"
+    assert first["world"] == "nominal"
     assert first["detected"] == 2
     assert first["evidence"][1] > first["evidence"][3]
     assert len(first["features"]) == 4 * len(FEATURES)
+
+
+def test_decisions_are_the_same_to_the_bit_whatever_the_truth_is():
+    """The true place and kind of a source are for the score only."""
+    encounter = next(encounters(4, EncounterConditions()))
+    poisoned = replace(encounter, is_target=False, place_ne_m=(math.nan, math.nan))
+
+    def decided(flown):
+        found = identifier_of(flown.survey_map, 4, noise_nt=0.3)
+        for reading in flown.passes[0]:
+            found.take(
+                1, reading, flown.survey_map.total_nt(reading.north_m, reading.east_m, reading.height_m)
+            )
+        return [(a.probability, a.log_evidence.tobytes(), a.place_ne_m, a.trace) for a in found.anomalies]
+
+    assert repr(decided(encounter)) == repr(decided(poisoned))
+    assert decided(encounter)
+
+
+def test_a_world_has_the_sources_and_the_noise_that_it_states():
+    rng = np.random.default_rng(1)
+    for kind in FalseSources:
+        source = false_source(rng, kind)
+        assert source.signatures
+        if kind is FalseSources.RIDGE:
+            places = np.array([(part.north_m, part.east_m) for part in source.signatures])
+            assert np.ptp(places, axis=0).max() > 200.0
+    noise = manoeuvre_noise(rng, 20_000, 0.1)
+    assert noise.std() == pytest.approx(1.0, rel=0.15)
+    first, other = encounters(3, EncounterConditions(with_target=False, false_sources=FalseSources.ANY))
+    assert not first.is_target and not other.is_target
+
+
+def test_the_worlds_of_the_option_are_those_of_the_study():
+    names = [world.value for world in MagneticWorlds if world is not MagneticWorlds.MISMATCHED]
+    assert names == list(WORLDS)
+    cells = study(IdentificationStudyOptions(world=(MagneticWorlds.WIDE,))).design.cells
+    assert [cell["world"] for cell in cells] == ["wide"]
+
+
+def test_a_summary_counts_names_and_dismissals_by_world():
+    """Four runs: a target named, one dismissed, one undecided, one not detected; two false names."""
+    stated = np.array(
+        [
+            [0.5, 0.99, 0.98, 0.1],
+            [0.02, 0.4, 0.2, 0.01],
+            [0.6, 0.5, 0.1, 0.97],
+            [math.nan, math.nan, 0.0, 0.0],
+        ]
+    )
+    found = _verdicts(stated, with_target=True)
+    counts = [found[key] for key in ("n", "targets", "named", "false_named", "dismissed", "undecided")]
+    assert counts == [8, 4, 1, 2, 1, 2]
+    assert found["brier"] == pytest.approx(
+        np.mean([0.01**2, 0.6**2, 0.5**2, 0.1**2, 0.01**2, 0.97**2, 0.0]), abs=1e-4
+    )
+    without = _verdicts(stated, with_target=False)
+    assert (without["targets"], without["false_named"]) == (0, 3)
 
 
 def test_encounters_of_another_seed_have_another_map_and_another_target():

@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -36,6 +37,22 @@ def test_points_find_the_target_of_the_world_and_a_seed_repeats_itself():
     assert np.array_equal(again.search.map.scores, first.search.map.scores)
 
 
+def test_where_there_is_no_target_nothing_is_found_and_its_probability_says_so():
+    """Two boats and no target; the search with the target has the same boats, and is sure of it."""
+    done = search_with_points(SMALL, 3, false_count=1, absent=True)
+    assert done.search.found is None
+    assert math.isnan(done.error_m)
+    assert done.search.no_target_probability > 0.5 > SMALL.search.no_target_prior
+    known = search_with_points(SMALL, 3, false_count=1)
+    assert known.error_m < 60.0
+    assert known.search.no_target_probability < 0.05
+
+
+def test_without_a_search_the_probability_of_no_target_is_the_one_before_it():
+    done = search_with_points(replace(SMALL, search_time_s=2.0), 3, false_count=0, absent=True)
+    assert done.search.no_target_probability == pytest.approx(SMALL.search.no_target_prior, abs=0.02)
+
+
 def test_a_search_that_is_over_names_nothing():
     done = search_with_points(
         OccupancyOptions(vehicles=1, width_m=900.0, height_m=900.0, search_time_s=2.0), 3, false_count=0
@@ -50,9 +67,10 @@ def test_the_time_of_a_search_that_does_not_name_the_target_is_infinite():
         "false_anomaly_named": [[0, 1, 1], [0, 0, 0]],
         "time_s": [[100.0, 20.0, 30.0], [90.0, 200.0, 300.0]],
         "error_m": [[8.0, 900.0, 700.0], [4.0, 6.0, 10.0]],
+        "no_target_probability": [[0.0, 0.5, 0.5], [0.0, 0.0, 0.0]],
     }
     results = SimpleNamespace(
-        cells=[{"identify": "threshold"}, {"identify": "bayes"}],
+        cells=[{"identify": way, "world": "nominal"} for way in ("threshold", "bayes")],
         finished=np.ones((2, 3), dtype=bool),
         values=lambda name: np.array(columns[name], dtype=np.float64),
     )
@@ -72,9 +90,10 @@ def test_searches_that_have_not_ended_are_not_counted():
         "false_anomaly_named": [[0, np.nan, 0], [0, 0, np.nan]],
         "time_s": [[100.0, np.nan, 30.0], [90.0, 200.0, np.nan]],
         "error_m": [[8.0, np.nan, 7.0], [4.0, 6.0, np.nan]],
+        "no_target_probability": [[0.0, np.nan, 0.5], [0.0, 0.0, np.nan]],
     }
     results = SimpleNamespace(
-        cells=[{"identify": "threshold"}, {"identify": "bayes"}],
+        cells=[{"identify": way, "world": "nominal"} for way in ("threshold", "bayes")],
         finished=~np.isnan(columns["time_s"]),
         values=lambda name: np.array(columns[name]),
     )
@@ -93,6 +112,7 @@ def test_without_the_threshold_nothing_is_compared_with_it():
         "false_anomaly_named": [[0, 1], [0, 0]],
         "time_s": [[100.0, 20.0], [90.0, 200.0]],
         "error_m": [[8.0, 900.0], [4.0, 6.0]],
+        "no_target_probability": [[0.0, 0.5], [0.0, 0.0]],
     }
     results = SimpleNamespace(
         cells=chosen.design.cells,
