@@ -1,11 +1,11 @@
-"""Time of one measurement of the particle filter of `magnetic-identification`, beside plain NumPy.
+"""Time of one measurement of the paper's particle filter in `magnetic-identification`, beside plain NumPy.
 
     python -m benchmarks.magnetic_identification [--particles 10000] [--passes 60]
 
-Both do the same: draw the noise of the control, move, weigh with the Kalman filter of each particle,
-normalize, and resample when the effective number is low. They fly passes over a target, each from its first
-measurement on, and alternate measurement by measurement in one process. The figures are the medians of the
-passes' means, so resampling has its usual share, and their ratio.
+Both do the same: draw the noise of the control, move, weigh, normalize, and resample when the effective
+number is low. They fly passes over a target, each from its first measurement on, and alternate measurement by
+measurement in one process. The figures are the medians of the passes' means, so resampling has its usual
+share, and their ratio.
 """
 
 import argparse
@@ -19,18 +19,13 @@ from numpy.typing import NDArray
 from autopilot_bridge.clock.pacing import wall_time_s
 from estimators.magnetic_identification import particles as p
 from estimators.magnetic_identification.classes import GaussianClass
-from estimators.magnetic_identification.hypotheses import Control, Measurement
-from estimators.magnetic_identification.particle_hypotheses import GaussianHypothesis
+from estimators.magnetic_identification.confidence import ConfidenceFilter, Control
 
 Array = NDArray[np.float64]
 
 STEP_M = 25.0
-DECAY = math.exp(-STEP_M / 100.0)
-CONTROL = Control(
-    forward_m=STEP_M, right_m=0.0, turn_rad=0.0, forward_sigma_m=0.5, turn_sigma_rad=0.02,
-    decay=DECAY, drive_nt2=1.0 - DECAY**2,
-)  # fmt: skip
-WHITE_NT2 = 0.05
+CONTROL = Control(forward_m=STEP_M, right_m=0.0, turn_rad=0.0, forward_sigma_m=0.5, turn_sigma_rad=0.02)
+VARIANCE_NT2 = 1.05
 
 
 class PlainFilter:
@@ -56,21 +51,9 @@ class PlainFilter:
             cosine * np.cos(turn) - sine * np.sin(turn),
             sine * np.cos(turn) + cosine * np.sin(turn),
         )
-        square = (rows[p.X] * rows[p.PER_ALONG]) ** 2 + (rows[p.Y] * rows[p.PER_ACROSS]) ** 2
-        term = of.amplitude_nt * np.exp(-0.5 * square)
-        map_nt = DECAY * rows[p.MAP]
-        aa, ab = rows[p.AMPLITUDE_VAR], DECAY * rows[p.AMPLITUDE_MAP]
-        bb = DECAY**2 * rows[p.MAP_VAR] + CONTROL.drive_nt2
-        residual = residual_nt - term * rows[p.AMPLITUDE] - map_nt
-        gain_a, gain_b = term * aa + ab, term * ab + bb
-        total = term * gain_a + gain_b + WHITE_NT2
-        share = residual / total
-        rows[p.AMPLITUDE] += gain_a * share
-        rows[p.MAP] = map_nt + gain_b * share
-        rows[p.AMPLITUDE_VAR] = aa - gain_a**2 / total
-        rows[p.AMPLITUDE_MAP] = ab - gain_a * gain_b / total
-        rows[p.MAP_VAR] = bb - gain_b**2 / total
-        likelihood = np.exp(-0.5 * residual * share) / np.sqrt(total)
+        square = (rows[p.X] / of.sigma_along_m) ** 2 + (rows[p.Y] / of.sigma_across_m) ** 2
+        residual = residual_nt - of.amplitude_nt * np.exp(-0.5 * square)
+        likelihood = np.exp(-0.5 * residual**2 / VARIANCE_NT2)
         self.weights = self.weights * likelihood
         self.weights /= self.weights.sum()
 
@@ -92,15 +75,11 @@ def pass_ms(particles: int, number: int) -> Array:
     noise = np.random.default_rng(number)
     along_m = STEP_M * np.arange(-7, 8)
     values = 0.85 * of.amplitude_nt * np.exp(-0.5 * (along_m / 70.0) ** 2)
-    values += math.sqrt(WHITE_NT2) * noise.standard_normal(len(values))
-    compiled = GaussianHypothesis(of, particles, np.random.Generator(np.random.SFC64(number)))
-    compiled.start(measurement(values[0]), map_nt2=1.0)
+    values += math.sqrt(VARIANCE_NT2) * noise.standard_normal(len(values))
+    compiled = ConfidenceFilter(of, particles, np.random.Generator(np.random.SFC64(number)))
+    compiled.start(float(values[0]), VARIANCE_NT2)
     plain = PlainFilter(of, compiled.particles, compiled.weights, noise)
-    return times_ms([lambda value: compiled.step(CONTROL, measurement(value)), plain.step], values[1:])
-
-
-def measurement(value: float) -> Measurement:
-    return Measurement(residual_nt=value, white_nt2=WHITE_NT2, height_m=80.0, course_rad=0.0)
+    return times_ms([lambda value: compiled.step(CONTROL, value, VARIANCE_NT2), plain.step], values[1:])
 
 
 def main() -> int:

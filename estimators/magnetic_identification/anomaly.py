@@ -1,11 +1,10 @@
 """One anomaly under investigation: its hypotheses, the evidence of each, and the trace of the confidence.
 
 Source: Lum, Rysdyk and Pongpunwattana 2005, section III. The paper has one hypothesis, the target, and reads
-its confidence; here every class has a filter, and the probabilities of the classes follow from their
-evidences (Bayes). Beside the classes stand explanations by something else, so that the target must fit better
-than these and not only better than the known false anomalies; and a target that fits badly loses its
-probability although nothing else fits (`goodness`). The paper's filter, with white noise and a fixed
-signature, runs beside them.
+its confidence; here every class is one, and the probabilities of the classes follow from their evidences
+(Bayes). Beside the classes stand explanations by something else, so that the target must fit better than
+these and not only better than the known false anomalies; and a target that fits badly loses its probability
+although nothing else fits (`goodness`). The paper's filter runs beside them.
 """
 
 import math
@@ -17,23 +16,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimators.magnetic_identification.classes import AnomalyClass, DipoleClass, GaussianClass
+from estimators.magnetic_identification.confidence import ConfidenceFilter, Control
 from estimators.magnetic_identification.goodness import fitting_share
 from estimators.magnetic_identification.hypotheses import (
-    Before,
-    Control,
+    BackgroundHypothesis,
+    Beginning,
     EdgeHypothesis,
     Hypothesis,
-    Measurement,
     ShapelessHypothesis,
 )
+from estimators.magnetic_identification.measurements import Measurements
 from estimators.magnetic_identification.parameters import IdentificationParameters
-from estimators.magnetic_identification.particle_hypotheses import (
+from estimators.magnetic_identification.samples import LikelyPlace, Sample, TracePoint
+from estimators.magnetic_identification.source_hypotheses import (
     BodyHypothesis,
     DipoleHypothesis,
     GaussianHypothesis,
-    ParticleHypothesis,
+    SourceHypothesis,
 )
-from estimators.magnetic_identification.samples import LikelyPlace, Sample, TracePoint
 from estimators.occupancy.detection import MapError
 from estimators.tracking.modes import Mode, find_modes
 
@@ -48,12 +48,16 @@ OTHERS: Final = ("other body", "other dipole", "map edge", "unknown")
 any depth, the edge of a tile of the map, and a source of any shape.
 """
 _BACKGROUND_PRIOR: Final = 0.15  # of what is no target
-_OTHER_PRIORS: Final = (0.28, 0.1, 0.05, 0.05)  # of what is no target, in the order of `OTHERS`
+_OTHER_PRIORS: Final = (0.28, 0.2, 0.05, 0.05)  # of what is no target, in the order of `OTHERS`
 _ANY_DIPOLE: Final = DipoleClass(name="dipole", strength_nt=15.0, least_m=20.0, most_m=400.0)
-_HOPELESS_NATS: Final = 30.0  # a hypothesis so far behind the best one is not followed any more
-_FIRST: Final = 3  # so many times more particles of bodies begin, and of classes
-_FIRST_OF_CLASS: Final = 2
-_FEWER: Final = 2  # dipoles have so many times fewer particles: their strengths are not sampled
+_HOPELESS_NATS: Final = 16.0
+"""A hypothesis so far behind the best one is not followed any more: the right one is that far behind at any
+time with a probability of exp(-16) at most (Ville's inequality).
+"""
+_SOURCES: Final = 0.15  # number of sources of a hypothesis over that of the paper's particles
+_BODIES: Final = 0.25  # likewise of bodies, of which five numbers are sampled
+_DIPOLES: Final = 0.06  # likewise of dipoles, of which three numbers are sampled
+_MOST_MEASUREMENTS: Final = 240  # of an anomaly: then it is known
 _ADJOINING_NATS: Final = math.log(10.0)  # sources are seldom so near to each other, parts of a body always
 _LONGEST_STEP_M: Final = 50.0  # the noise of a motion does not grow beyond it: positions are absolute
 _SHIFTS: Final = 8  # of a place to the mean around it
@@ -82,7 +86,7 @@ class Anomaly:
         threshold_nt: float,
         field_ned: Array,
         rng: np.random.Generator,
-        last: Sample | None = None,
+        approach: Sequence[Sample] = (),
     ) -> None:
         """Start every hypothesis with the first measurement beyond the threshold.
 
@@ -94,7 +98,7 @@ class Anomaly:
             threshold_nt: threshold that the measurement exceeds.
             field_ned: (3,) direction of the Earth's field.
             rng: random numbers of the filters.
-            last: the measurement before, by the same vehicle; None: there is none.
+            approach: the measurements right before, by the same vehicle, within the threshold.
         """
         q = parameters
         self.number = number
@@ -107,26 +111,21 @@ class Anomaly:
         self._loudest = first
         self._sought = [k for k, of in enumerate(classes) if of.sought]
         gaussians = [of for of in classes if of.sought and isinstance(of, GaussianClass)]
-        hypotheses: list[Hypothesis] = []
-        for of in classes:
-            if isinstance(of, GaussianClass):
-                hypotheses.append(
-                    GaussianHypothesis(of, q.particles, rng, first=_FIRST_OF_CLASS, by_roulette=q.roulette)
-                )
-            else:
-                hypotheses.append(
-                    DipoleHypothesis(
-                        of, q.particles // _FEWER, rng, field_ned=field_ned, by_roulette=q.roulette
-                    )
-                )
+        self._seen = Measurements(map_error, first)
+        sources, dipoles = round(_SOURCES * q.particles), round(_DIPOLES * q.particles)
+        speed_m_s = q.target_speed_m_s
+        hypotheses: list[Hypothesis] = [
+            GaussianHypothesis(of, sources, rng, speed_m_s=speed_m_s)
+            if isinstance(of, GaussianClass)
+            else DipoleHypothesis(of, dipoles, rng, field_ned=field_ned, speed_m_s=speed_m_s)
+            for of in classes
+        ]
         hypotheses += [
-            BodyHypothesis(gaussians, q.particles, rng, first=_FIRST, by_roulette=q.roulette),
-            DipoleHypothesis(
-                _ANY_DIPOLE, q.particles // _FEWER, rng, field_ned=field_ned, by_roulette=q.roulette
-            ),
+            BodyHypothesis(gaussians, round(_BODIES * q.particles), rng),
+            DipoleHypothesis(_ANY_DIPOLE, dipoles, rng, field_ned=field_ned),
             EdgeHypothesis(q.unknown_nt),
-            ShapelessHypothesis(math.hypot(q.unknown_nt, map_error.sigma_nt), q.unknown_m),
-            ShapelessHypothesis(map_error.sigma_nt),
+            ShapelessHypothesis(q.unknown_nt, q.unknown_m),
+            BackgroundHypothesis(),
         ]
         self.names = (*(of.name for of in classes), *OTHERS, BACKGROUND)
         self._hypotheses = hypotheses
@@ -136,46 +135,52 @@ class Anomaly:
         self._adjoins = False
         self._log_prior = np.log(_priors(classes, q.target_prior))
         self.log_evidence: Array = np.zeros(len(hypotheses))
-        self._paper: GaussianHypothesis | None = None
-        if gaussians:
-            exact = replace(gaussians[0], amplitude_spread=0.0, size_spread=0.0)
-            self._paper = GaussianHypothesis(exact, q.particles, rng, by_roulette=q.roulette)
-        seen = self._measurement(first)
-        before = self._before(first, last, threshold_nt)
+        for sample in approach:
+            self._seen.add(sample, self._white_nt2(sample))
+        quiet = self._seen.log_density()
+        self._seen.add(first, self._white_nt2(first))
+        beginning = self._beginning(first, approach, threshold_nt)
         for k, hypothesis in enumerate(hypotheses):
-            self.log_evidence[k] = hypothesis.start(seen, map_error.sigma_nt**2, threshold_nt, before)
-        if self._paper is not None:
-            self._paper.start(self._white(seen), 0.0)
+            # the approach is no measurement of the anomaly: its own density counts for none
+            self.log_evidence[k] = hypothesis.start(self._seen, beginning) - quiet
+        self._paper: ConfidenceFilter | None = None
+        if gaussians:
+            self._paper = ConfidenceFilter(gaussians[0], q.particles, rng, by_roulette=q.roulette)
+            self._paper.start(first.residual_nt, self._alone_nt2(first))
         self._place_ne_m: tuple[float, float] | None = None
         self._note(first, math.nan)
 
     def take(self, sample: Sample) -> None:
         """One more measurement of any vehicle."""
-        seen = self._measurement(sample)
-        control = self._control(self._last, sample)
-        best = int(np.argmax(self.log_evidence))
-        behind = self.log_evidence - self.log_evidence[best] < -_HOPELESS_NATS
-        for k, hypothesis in enumerate(self._hypotheses):
-            if behind[k]:
-                continue
-            update = hypothesis.step(control, seen)
-            self.log_evidence[k] += update.log_density
-            self._misfits[k] += update.misfit
-            if k == best:
-                self.log_evidence[behind] += update.log_density
-        self._steps += 1
+        if self._seen.count < _MOST_MEASUREMENTS:
+            self._weigh(sample)
         confidence = math.nan
         if self._paper is not None:
-            exact = replace(control, decay=0.0, drive_nt2=0.0)
-            confidence = self._paper.step(exact, self._white(seen)).confidence
+            control = self._control(self._last, sample)
+            confidence = self._paper.step(control, sample.residual_nt, self._alone_nt2(sample))
         self._last = sample
         if abs(sample.residual_nt) > abs(self._loudest.residual_nt):
             self._loudest = sample
         self._note(sample, confidence)
 
+    def _weigh(self, sample: Sample) -> None:
+        """Weigh the hypotheses by a measurement; those that are far behind are not followed any more."""
+        self._seen.add(sample, self._white_nt2(sample))
+        best = int(np.argmax(self.log_evidence))
+        behind = self.log_evidence < self.log_evidence[best] - _HOPELESS_NATS
+        for k, hypothesis in enumerate(self._hypotheses):
+            if behind[k]:
+                continue
+            update = hypothesis.step(self._seen)
+            self.log_evidence[k] += update.log_density
+            self._misfits[k] += update.misfit
+            if k == best:
+                self.log_evidence[behind] += update.log_density
+        self._steps += 1
+
     def adjoin(self) -> None:
-        """Note that the anomaly goes on into another one without a gap: they are rather one long body than
-        two sources beside each other.
+        """Note that the anomaly goes on into another one, or is right beside it: they are rather one long
+        body than two sources.
         """
         if not self._adjoins:
             self._adjoins = True
@@ -185,54 +190,49 @@ class Anomaly:
         """Return to the state of an earlier copy (`copy.deepcopy`), which must not be used any more."""
         self.__dict__.update(kept.__dict__)
 
-    def _before(self, first: Sample, last: Sample | None, threshold_nt: float) -> Before | None:
-        """The measurement before the first one beyond the threshold, if the track entered the anomaly
-        between them.
-        """
-        if last is None or abs(last.residual_nt) > threshold_nt:
-            return None
-        step_m = math.hypot(first.north_m - last.north_m, first.east_m - last.east_m)
-        if not 0.0 < step_m <= _LONGEST_STEP_M:
-            return None
-        # particles start at the first measurement, on its course
-        along = replace(last, course_rad=first.course_rad)
-        return Before(seen=self._measurement(along), control=self._control(along, first))
+    def _beginning(self, first: Sample, approach: Sequence[Sample], threshold_nt: float) -> Beginning:
+        step_ne_m, shared_nt2 = None, 0.0
+        if approach:
+            step_ne_m = (first.north_m - approach[-1].north_m, first.east_m - approach[-1].east_m)
+            shared_nt2 = float(self._seen.map_covariance_nt2(np.hypot(*step_ne_m)))
+        # of the noise of a measurement at the threshold
+        at_threshold = replace(first, residual_nt=threshold_nt)
+        return Beginning(
+            threshold_nt=threshold_nt,
+            north_m=first.north_m,
+            east_m=first.east_m,
+            step_ne_m=step_ne_m,
+            map_nt2=self._map_error.sigma_nt**2,
+            shared_nt2=shared_nt2,
+            white_nt2=self._white_nt2(at_threshold),
+        )
 
     def _control(self, last: Sample, sample: Sample) -> Control:
         """The motion between two measurements."""
-        q, map_error = self._parameters, self._map_error
+        q = self._parameters
         north_m, east_m = sample.north_m - last.north_m, sample.east_m - last.east_m
         cosine, sine = math.cos(last.course_rad), math.sin(last.course_rad)
-        forward_m, right_m = cosine * north_m + sine * east_m, cosine * east_m - sine * north_m
         turn_rad = math.remainder(sample.course_rad - last.course_rad, math.tau)
         distance_m = math.hypot(north_m, east_m)
         elapsed_s = abs(sample.time_us - last.time_us) * 1e-6
-        decay = math.exp(-distance_m / map_error.correlation_m)
         walked_m = q.target_speed_m_s * min(elapsed_s, 60.0)
         return Control(
-            forward_m=forward_m,
-            right_m=right_m,
+            forward_m=cosine * north_m + sine * east_m,
+            right_m=cosine * east_m - sine * north_m,
             turn_rad=turn_rad,
             forward_sigma_m=math.hypot(q.forward_noise * min(distance_m, _LONGEST_STEP_M), walked_m),
             turn_sigma_rad=math.hypot(q.turn_noise * turn_rad, q.course_noise_rad),
-            decay=decay,
-            drive_nt2=(1.0 - decay * decay) * map_error.sigma_nt**2,
         )
 
-    def _measurement(self, sample: Sample) -> Measurement:
+    def _white_nt2(self, sample: Sample) -> float:
+        """Variance of what a measurement shares with no other one."""
         q = self._parameters
-        return Measurement(
-            residual_nt=sample.residual_nt,
-            white_nt2=q.noise_nt**2 / sample.readings
-            + sample.excess_nt2
-            + (q.shape_error * sample.residual_nt) ** 2,
-            height_m=sample.height_m,
-            course_rad=sample.course_rad,
-        )
+        shape_nt = q.shape_error * sample.residual_nt
+        return q.noise_nt**2 / sample.readings + sample.excess_nt2 + shape_nt**2
 
-    def _white(self, seen: Measurement) -> Measurement:
-        """As the paper's filter sees it: the error of the map is white."""
-        return replace(seen, white_nt2=seen.white_nt2 + self._map_error.sigma_nt**2)
+    def _alone_nt2(self, sample: Sample) -> float:
+        """Variance of a measurement for the paper's filter: the error of the map is white."""
+        return self._white_nt2(sample) + self._map_error.sigma_nt**2
 
     def _note(self, sample: Sample, confidence: float) -> None:
         self._place_ne_m = None
@@ -293,8 +293,8 @@ class Anomaly:
         if self._place_ne_m is None:
             # of the classes: a body of any extent may be anywhere after few measurements
             best = self._hypotheses[int(np.argmax(self.probabilities[: -len(OTHERS) - 1]))]
-            assert isinstance(best, ParticleHypothesis)
-            self._place_ne_m = self._in_map(*best.mean_place_m())
+            assert isinstance(best, SourceHypothesis)
+            self._place_ne_m = best.mean_place_m()
         return self._place_ne_m
 
     def likeliest_place(self, radius_m: float) -> LikelyPlace:
@@ -304,9 +304,9 @@ class Anomaly:
         """
         best = self._sought[int(np.argmax(self.probabilities[self._sought]))]
         hypothesis = self._hypotheses[best]
-        if not isinstance(hypothesis, ParticleHypothesis):
+        if not isinstance(hypothesis, SourceHypothesis):
             return LikelyPlace(north_m=self._loudest.north_m, east_m=self._loudest.east_m, share=0.0)
-        sources, weights = hypothesis.sources(), hypothesis.weights
+        sources, weights = hypothesis.places(), hypothesis.weights
         found = []
         for mode in find_modes(sources, weights):
             centre = np.array(mode.mean[:2])
@@ -319,19 +319,16 @@ class Anomaly:
                 if np.array_equal(before, centre):
                     break
             found.append((share, *centre.tolist()))
-        share, forward_m, right_m = max(found, default=(0.0, 0.0, 0.0))
-        north_m, east_m = self._in_map(forward_m, right_m)
+        share, north_m, east_m = max(found, default=(0.0, *self.place_ne_m))
         return LikelyPlace(north_m=north_m, east_m=east_m, share=share)
 
     def modes(self) -> list[Mode]:
         """The modes under the most probable target: north and east from the map's home, axis from north."""
         best = self._sought[int(np.argmax(self.probabilities[self._sought]))]
         hypothesis = self._hypotheses[best]
-        if not isinstance(hypothesis, ParticleHypothesis):
+        if not isinstance(hypothesis, SourceHypothesis):
             return []
-        found = find_modes(hypothesis.sources(), hypothesis.weights)
-        course = self._last.course_rad
-        return [mode.moved(self._in_map(*mode.mean[:2]), course) for mode in found]
+        return find_modes(hypothesis.places(), hypothesis.weights)
 
     def predictions(self, north_m: Array, east_m: Array, height_m: float, count: int) -> list[Array | None]:
         """What a pass over places (n,) would measure, nT, by each hypothesis: (count, n) for as many equally
@@ -339,26 +336,11 @@ class Anomaly:
         """
         found: list[Array | None] = []
         for hypothesis in self._hypotheses[:-1]:
-            if not isinstance(hypothesis, ParticleHypothesis):
+            if not isinstance(hypothesis, SourceHypothesis):
                 found.append(None)
                 continue
-            last = self._last
-            cosine, sine = math.cos(last.course_rad), math.sin(last.course_rad)
-            off_n, off_e = north_m - last.north_m, east_m - last.east_m
-            found.append(
-                hypothesis.predicted_nt(
-                    cosine * off_n + sine * off_e, cosine * off_e - sine * off_n, height_m, count
-                )
-            )
+            found.append(hypothesis.predicted_nt(north_m, east_m, height_m, count))
         return [*found, np.zeros((1, len(north_m)))]
-
-    def _in_map(self, forward_m: float, right_m: float) -> tuple[float, float]:
-        last = self._last
-        cosine, sine = math.cos(last.course_rad), math.sin(last.course_rad)
-        return (
-            last.north_m + cosine * forward_m - sine * right_m,
-            last.east_m + sine * forward_m + cosine * right_m,
-        )
 
 
 def _priors(classes: Sequence[AnomalyClass], target_prior: float) -> Array:

@@ -1,6 +1,6 @@
 """What a hypothesis about one anomaly takes and gives, and the hypotheses without a signature: the error of
-the map, the edge of a tile of it, and a body of unknown shape. Those with a signature are in
-`particle_hypotheses`.
+the map, the edge of a tile of it, and a field of unknown shape. Those with a signature are in
+`source_hypotheses`.
 
 The evidence of a hypothesis is the probability density of all measurements under it, given that they begin an
 anomaly.
@@ -8,76 +8,56 @@ anomaly.
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from estimators.magnetic_identification.measurements import Measurements
+from flightsim.foundation.kernels import kernel
+
 __all__ = [
-    "Before",
-    "Control",
+    "BackgroundHypothesis",
+    "Beginning",
     "EdgeHypothesis",
     "Hypothesis",
-    "Measurement",
     "ShapelessHypothesis",
     "Update",
-    "log_beyond",
 ]
 
 Array = NDArray[np.float64]
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Measurement:
-    """A differential measurement.
-
-    Attributes:
-        residual_nt: reading less map, less level.
-        white_nt2: variance of its white noise.
-        height_m: height of the sensor above the map's home.
-        course_rad: course of the vehicle.
-    """
-
-    residual_nt: float
-    white_nt2: float
-    height_m: float
-    course_rad: float
+_LENGTHS: Final = (0.35, 0.6, 1.0)  # of a field of unknown shape, over the stated one
+_SIZES: Final = (0.6, 1.2, 2.4)  # likewise of its standard deviation
+_ROOM: Final = 64  # measurements
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
+_BEYOND: Final = 2.5 * (1.0 + _NODES)  # standard deviations: beyond five there is nothing
+_BEYOND_WEIGHTS: Final = 2.5 * _WEIGHTS
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Control:
-    """The motion between two measurements, and what it does to the error of the map.
-
-    Attributes:
-        forward_m, right_m: displacement along and across the course at the earlier measurement.
-        turn_rad: change of the course.
-        forward_sigma_m, turn_sigma_rad: standard deviations of displacement and turn.
-        decay, drive_nt2: factor of the error of the map, and the variance that is added.
-    """
-
-    forward_m: float
-    right_m: float
-    turn_rad: float
-    forward_sigma_m: float
-    turn_sigma_rad: float
-    decay: float
-    drive_nt2: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Before:
-    """The last measurement within the threshold, before the first one beyond it.
+class Beginning:
+    """How an anomaly begins: a measurement within a threshold, then one beyond it.
 
     An anomaly begins where a track enters it: a vehicle that flies outwards, or along the edge, crosses the
     threshold seldom or never.
 
     Attributes:
-        seen: the measurement.
-        control: the motion from it to the first one beyond.
+        threshold_nt: the threshold.
+        north_m, east_m: place of the measurement beyond it.
+        step_ne_m: from the measurement before to it; None: there is none, or it was beyond the threshold too.
+        map_nt2: variance of the error of the map.
+        shared_nt2: covariance of that error at both.
+        white_nt2: variance of the white noise of a measurement.
     """
 
-    seen: Measurement
-    control: Control
+    threshold_nt: float
+    north_m: float
+    east_m: float
+    step_ne_m: tuple[float, float] | None
+    map_nt2: float
+    shared_nt2: float
+    white_nt2: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -86,87 +66,37 @@ class Update:
 
     Attributes:
         log_density: logarithm of its density, given the measurements before it, 1/nT.
-        confidence: the paper's (7), 0..1.
         misfit: square of the difference between measurement and prediction, over the variance that is
             predicted for it: one in the mean where the hypothesis is right, whatever came before.
     """
 
     log_density: float
-    confidence: float
     misfit: float
 
 
 class Hypothesis(Protocol):
     """One explanation of an anomaly."""
 
-    def start(
-        self, seen: Measurement, map_nt2: float, threshold_nt: float = 0.0, before: Before | None = None
-    ) -> float:
-        """Begin with the first measurement beyond a threshold.
-
-        Args:
-            seen: the measurement.
-            map_nt2: variance of the error of the map.
-            threshold_nt: there is an anomaly because the measurement is beyond it.
-            before: the measurement before; None: there is none, or it was beyond the threshold too.
+    def start(self, seen: Measurements, beginning: Beginning) -> float:
+        """Begin with the measurements up to the first one beyond a threshold.
 
         Returns:
-            Logarithm of the density of the measurements, given that they begin an anomaly.
+            Logarithm of their density, given that the last one begins an anomaly.
         """
 
-    def step(self, control: Control, seen: Measurement) -> Update:
-        """One more measurement."""
+    def step(self, seen: Measurements) -> Update:
+        """One more measurement, the newest one."""
 
 
-class ShapelessHypothesis:
-    """An anomaly without a signature: a Gauss-Markov process along the track, whose evidence is exact.
+class BackgroundHypothesis:
+    """There is only the error of the map. Its evidence is exact."""
 
-    Args:
-        sigma_nt: standard deviation of the process.
-        correlation_m: its correlation distance; None: that of the map's error, whose process this is.
-    """
+    def start(self, seen: Measurements, beginning: Beginning) -> float:
+        map_nt2 = beginning.map_nt2
+        return seen.log_density() - _log_entering(beginning, map_nt2, map_nt2, beginning.shared_nt2)
 
-    def __init__(self, sigma_nt: float, correlation_m: float | None = None) -> None:
-        self._sigma_nt2 = sigma_nt * sigma_nt
-        self._correlation_m = correlation_m
-        self._mean_nt = 0.0
-        self._variance_nt2 = 0.0
-
-    def start(
-        self, seen: Measurement, map_nt2: float, threshold_nt: float = 0.0, before: Before | None = None
-    ) -> float:
-        variance_nt2 = map_nt2 if self._correlation_m is None else self._sigma_nt2
-        self._mean_nt, self._variance_nt2 = 0.0, variance_nt2
-        if before is None:
-            beyond = log_beyond(threshold_nt, np.array([math.sqrt(variance_nt2 + seen.white_nt2)]))
-            return self._update(seen).log_density - beyond
-        total_nt = math.sqrt(variance_nt2 + before.seen.white_nt2)
-        shared_nt2 = self._decay(before.control)[0] * variance_nt2
-        beginning = _log_entering(threshold_nt, total_nt, total_nt, shared_nt2)
-        first = self._update(before.seen).log_density
-        return first + self.step(before.control, seen).log_density - beginning
-
-    def step(self, control: Control, seen: Measurement) -> Update:
-        decay, drive_nt2 = self._decay(control)
-        self._mean_nt *= decay
-        self._variance_nt2 = decay * decay * self._variance_nt2 + drive_nt2
-        return self._update(seen)
-
-    def _decay(self, control: Control) -> tuple[float, float]:
-        """Factor of the process since the last measurement, and the variance that is added."""
-        if self._correlation_m is None:
-            return control.decay, control.drive_nt2
-        decay = math.exp(-math.hypot(control.forward_m, control.right_m) / self._correlation_m)
-        return decay, (1.0 - decay * decay) * self._sigma_nt2
-
-    def _update(self, seen: Measurement) -> Update:
-        total_nt2 = self._variance_nt2 + seen.white_nt2
-        residual_nt = seen.residual_nt - self._mean_nt
-        fit = residual_nt * residual_nt / total_nt2
-        gain = self._variance_nt2 / total_nt2
-        self._mean_nt += gain * residual_nt
-        self._variance_nt2 *= 1.0 - gain
-        return _update_of(fit, total_nt2)
+    def step(self, seen: Measurements) -> Update:
+        return Update(log_density=seen.log_density(seen.count - 1), misfit=float(seen.white[-1] ** 2))
 
 
 class EdgeHypothesis:
@@ -179,66 +109,152 @@ class EdgeHypothesis:
 
     def __init__(self, sigma_nt: float) -> None:
         self._sigma_nt2 = sigma_nt * sigma_nt
-        self._mean_nt: Array = np.zeros(2)  # offset, error of the map
-        self._covariance_nt2: Array = np.zeros((2, 2))
+        self._signals: Array = np.zeros(0)
+        self._log_density = 0.0
 
-    def start(
-        self, seen: Measurement, map_nt2: float, threshold_nt: float = 0.0, before: Before | None = None
-    ) -> float:
-        self._mean_nt = np.zeros(2)
-        self._covariance_nt2 = np.diag((self._sigma_nt2, map_nt2))
-        now_nt = math.sqrt(self._sigma_nt2 + map_nt2 + seen.white_nt2)
-        if before is None:
-            return self._update(seen, 1.0).log_density - log_beyond(threshold_nt, np.array([now_nt]))
-        then_nt = math.sqrt(map_nt2 + before.seen.white_nt2)
-        beginning = _log_entering(threshold_nt, then_nt, now_nt, before.control.decay * map_nt2)
-        first = self._update(before.seen, 0.0).log_density
-        return first + self.step(before.control, seen).log_density - beginning
+    def start(self, seen: Measurements, beginning: Beginning) -> float:
+        offset = np.zeros(seen.count)
+        offset[-1] = 1.0
+        self._signals = seen.whitened(offset)
+        self._log_density = self._density(seen)
+        map_nt2 = beginning.map_nt2
+        entering = _log_entering(beginning, map_nt2, self._sigma_nt2 + map_nt2, beginning.shared_nt2)
+        return self._log_density - entering
 
-    def step(self, control: Control, seen: Measurement) -> Update:
-        decays = np.array([1.0, control.decay])
-        self._mean_nt *= decays
-        self._covariance_nt2 *= np.outer(decays, decays)
-        self._covariance_nt2[1, 1] += control.drive_nt2
-        return self._update(seen, 1.0)
+    def step(self, seen: Measurements) -> Update:
+        before = self._log_density
+        precision, product = float(self._signals @ self._signals), float(self._signals @ seen.white[:-1])
+        signal = float(seen.whitened_next(np.ones(1), self._signals[:, None])[0])
+        variance = self._sigma_nt2 / (1.0 + self._sigma_nt2 * precision)
+        misfit = (seen.white[-1] - signal * variance * product) ** 2 / (1.0 + signal * signal * variance)
+        self._signals = np.append(self._signals, signal)
+        self._log_density = self._density(seen)
+        return Update(log_density=self._log_density - before, misfit=float(misfit))
 
-    def _update(self, seen: Measurement, offset: float) -> Update:
-        """Correct by a measurement behind the edge (offset 1) or before it (0)."""
-        row = np.array([offset, 1.0])
-        gain = self._covariance_nt2 @ row
-        total_nt2 = float(row @ gain) + seen.white_nt2
-        residual_nt = seen.residual_nt - float(row @ self._mean_nt)
-        self._mean_nt += gain * (residual_nt / total_nt2)
-        self._covariance_nt2 -= np.outer(gain, gain) / total_nt2
-        return _update_of(residual_nt * residual_nt / total_nt2, total_nt2)
+    def _density(self, seen: Measurements) -> float:
+        precision, product = float(self._signals @ self._signals), float(self._signals @ seen.white)
+        one = 1.0 + self._sigma_nt2 * precision
+        return seen.log_density() + 0.5 * (self._sigma_nt2 * product * product / one - math.log(one))
 
 
-def _update_of(fit: float, total_nt2: float) -> Update:
-    """What a measurement says about a hypothesis that predicts a normal number."""
-    return Update(
-        log_density=-0.5 * (fit + math.log(math.tau * total_nt2)), confidence=math.exp(-0.5 * fit), misfit=fit
-    )
-
-
-def log_beyond(threshold_nt: float, sigmas_nt: Array) -> float:
-    """Logarithm of the mean probability that normal numbers without a mean are beyond a threshold."""
-    scaled = threshold_nt / math.sqrt(2.0) / sigmas_nt
-    shares = [math.erfc(value) for value in scaled.tolist()]
-    return math.log(max(sum(shares) / len(shares), 1e-300))
-
-
-def _log_entering(threshold_nt: float, then_nt: float, now_nt: float, shared_nt2: float) -> float:
-    """Logarithm of the probability that the first of two normal numbers without a mean is within a threshold
-    and the second one beyond it.
+class ShapelessHypothesis:
+    """A source of any shape: a Gaussian process over the plane, whose evidence is exact (Rasmussen and
+    Williams 2006, section 2.7). Lines that cross measure the same field, so it knows what two passes have in
+    common. Its extent and size are one of a few.
 
     Args:
-        threshold_nt: the threshold.
-        then_nt, now_nt: their standard deviations.
-        shared_nt2: their covariance.
+        sigma_nt: standard deviation of the field.
+        length_m: distance over which it is alike.
     """
-    second = threshold_nt + now_nt * np.linspace(0.0, 8.0, 161)
+
+    def __init__(self, sigma_nt: float, length_m: float) -> None:
+        pairs = [(length * length_m, size * sigma_nt) for length in _LENGTHS for size in _SIZES]
+        self._fields: Array = np.array(pairs).T  # lengths, standard deviations
+        self._logs: Array = np.full(len(pairs), -math.log(len(pairs)))
+        self._lower: Array = np.zeros((len(pairs), _ROOM, _ROOM))
+        self._white: Array = np.zeros((len(pairs), _ROOM))
+
+    def start(self, seen: Measurements, beginning: Beginning) -> float:
+        density = sum(self._take(seen, number).log_density for number in range(seen.count))
+        entering = 0.0
+        for length_m, sigma_nt in self._fields.T.tolist():
+            shared_nt2 = beginning.shared_nt2
+            if beginning.step_ne_m is not None:
+                step_m = math.hypot(*beginning.step_ne_m)
+                shared_nt2 += sigma_nt**2 * math.exp(-0.5 * (step_m / length_m) ** 2)
+            total_nt2 = sigma_nt**2 + beginning.map_nt2
+            entering += math.exp(_log_entering(beginning, total_nt2, total_nt2, shared_nt2))
+        return density - math.log(entering / self._fields.shape[1])
+
+    def step(self, seen: Measurements) -> Update:
+        return self._take(seen, seen.count - 1)
+
+    def _take(self, seen: Measurements, number: int) -> Update:
+        if number == self._white.shape[1]:
+            self._white = np.pad(self._white, ((0, 0), (0, number)))
+            self._lower = np.pad(self._lower, ((0, 0), (0, number), (0, number)))
+        north_m, east_m = seen.places()[:2]
+        off, variance = np.empty((2, len(self._logs)))
+        _add_to_fields(
+            self._lower,
+            self._white,
+            (north_m[: number + 1], east_m[: number + 1]),
+            self._fields,
+            seen.covariances_nt2(number),
+            seen.residual_nt(number),
+            off,
+            variance,
+        )
+        shares = np.exp(self._logs - self._logs.max())
+        shares /= shares.sum()
+        logs = -0.5 * (off**2 / variance + np.log(math.tau * variance))
+        self._logs = self._logs + logs
+        mean = float(shares @ off)
+        spread = float(shares @ (off**2 + variance)) - mean * mean
+        best = float(logs.max())
+        density = best + math.log(float(shares @ np.exp(logs - best)))
+        return Update(log_density=density, misfit=mean * mean / spread)
+
+
+@kernel
+def _add_to_fields(
+    lower: Array,
+    white: Array,
+    places_m: tuple[Array, Array],
+    fields: Array,
+    covariances_nt2: Array,
+    residual_nt: float,
+    off: Array,
+    variance: Array,
+) -> None:
+    """One more row of the Cholesky factors of the covariances of the measurements.
+
+    Args:
+        lower: (fields, room, room) those factors; changed in place.
+        white: (fields, room) whitened measurements; changed in place.
+        places_m: north and east (n,) of the measurements, the new one last.
+        fields: (2, fields) lengths and standard deviations.
+        covariances_nt2: (n,) of the errors of the new one.
+        residual_nt: the measurement.
+        off, variance: (fields,) out: of the measurement, given those before.
+    """
+    north_m, east_m = places_m
+    new = north_m.size - 1
+    for f in range(fields.shape[1]):
+        square, size = 2.0 * fields[0, f] * fields[0, f], fields[1, f] * fields[1, f]
+        row = lower[f, new]
+        left, innovation = size + covariances_nt2[new], residual_nt
+        for j in range(new):
+            off_n, off_e = north_m[new] - north_m[j], east_m[new] - east_m[j]
+            total = size * math.exp(-(off_n * off_n + off_e * off_e) / square) + covariances_nt2[j]
+            for i in range(j):
+                total -= row[i] * lower[f, j, i]
+            row[j] = total / lower[f, j, j]
+            left -= row[j] * row[j]
+            innovation -= row[j] * white[f, j]
+        left = max(left, 1e-9 * (size + covariances_nt2[new]))
+        row[new] = math.sqrt(left)
+        white[f, new] = innovation / row[new]
+        off[f], variance[f] = innovation, left
+
+
+def _log_entering(beginning: Beginning, then_nt2: float, now_nt2: float, shared_nt2: float) -> float:
+    """Logarithm of the probability that the measurement before is within the threshold and the next one
+    beyond it; without one before, that it is beyond.
+
+    Args:
+        beginning: the threshold and the noise.
+        then_nt2, now_nt2: variances of what they measure, which has no mean.
+        shared_nt2: its covariance.
+    """
+    threshold_nt = beginning.threshold_nt
+    now_nt = math.sqrt(now_nt2 + beginning.white_nt2)
+    if beginning.step_ne_m is None:
+        return math.log(max(math.erfc(threshold_nt / (math.sqrt(2.0) * now_nt)), 1e-300))
+    then_nt2 += beginning.white_nt2
+    second = threshold_nt + now_nt * _BEYOND
     slope = shared_nt2 / (now_nt * now_nt)
-    apart = math.sqrt(max(1e-12 * then_nt * then_nt, then_nt * then_nt - slope * shared_nt2)) * math.sqrt(2.0)
+    apart = math.sqrt(2.0 * max(1e-12 * then_nt2, then_nt2 - slope * shared_nt2))
     within = np.array(
         [
             0.5
@@ -250,4 +266,4 @@ def _log_entering(threshold_nt: float, then_nt: float, now_nt: float, shared_nt2
         ]
     )
     density = np.exp(-0.5 * (second / now_nt) ** 2) / (now_nt * math.sqrt(math.tau)) * within
-    return math.log(max(2.0 * float(np.trapezoid(density, second)), 1e-300))
+    return math.log(max(2.0 * now_nt * float(density @ _BEYOND_WEIGHTS), 1e-300))

@@ -12,6 +12,7 @@ them (Bayes factor); if that is the rival, the known one is as it was.
 
 import copy
 import math
+from collections import deque
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -35,6 +36,9 @@ _SMALL: Final = 0.5  # of the threshold
 _SIGMAS: Final = 3.0
 _APART_M: Final = 50.0  # of track with small measurements within a pass: what follows may be another source
 _LEAST_STEP_M: Final = 1.0  # shorter displacements give no course
+_APPROACH: Final = 8  # measurements before an anomaly: a source shows long before the threshold
+_LONGEST_STEP_M: Final = 50.0  # between them
+_ADJOINING: Final = 0.4  # of the reach: two sources so near to each other are rather parts of one
 _ANOTHER_NATS: Final = 6.0  # by which a rival must be better: other sources within reach are seldom
 
 
@@ -90,6 +94,7 @@ class _Vehicle:
         rival: alternative to it, if it was known before the pass.
         loudest: largest measurement of the pass in progress.
         small_m: length of track since the last measurement that was not small.
+        approach: the newest measurements, as far as they are on quiet track.
         doubtful: anomalies that began while the level was doubtful.
     """
 
@@ -103,6 +108,7 @@ class _Vehicle:
     rival: _Rival | None = None
     loudest: Sample | None = None
     small_m: float = 0.0
+    approach: deque[Sample] = field(default_factory=lambda: deque(maxlen=_APPROACH))
     doubtful: list[Anomaly] = field(default_factory=list)
 
     def note(self, sample: Sample, last: Sample | None, *, small_nt: float) -> Sample:
@@ -111,7 +117,7 @@ class _Vehicle:
         if size_nt > small_nt:
             self.small_m = 0.0
         elif last is not None:
-            self.small_m += math.hypot(sample.north_m - last.north_m, sample.east_m - last.east_m)
+            self.small_m += _apart_m(last, sample)
         if self.loudest is None or size_nt > abs(self.loudest.residual_nt):
             self.loudest = sample
         return self.loudest
@@ -235,6 +241,8 @@ class Identifier:
         last, vehicle.last = vehicle.last, sample
         vehicle.threshold_nt = self._threshold_nt(sample.excess_nt2)
         loud = abs(sample.residual_nt) > vehicle.threshold_nt
+        if last is not None and _apart_m(last, sample) > _LONGEST_STEP_M:
+            vehicle.approach.clear()
         present, passed = self._within_reach(sample), vehicle.anomaly
         ended: Anomaly | None = None
         loudest, doubted = vehicle.loudest, vehicle.detector.level_doubtful
@@ -247,14 +255,14 @@ class Identifier:
         if present is not None:
             self._take(vehicle, present, sample, last if loud else None)
         elif loud and last is not None:
-            present = vehicle.anomaly = self._start(sample, last, vehicle.threshold_nt)
+            present = vehicle.anomaly = self._start(sample, vehicle)
             if vehicle.detector.level_doubtful:
                 vehicle.doubtful.append(present)
         elif last is not None:
             vehicle.noise.take(
                 sample.residual_nt,
                 self._parameters.noise_nt**2 / sample.readings,
-                math.hypot(sample.north_m - last.north_m, sample.east_m - last.east_m),
+                _apart_m(last, sample),
                 math.remainder(sample.course_rad - last.course_rad, math.tau),
             )
         goes_on = loud and last is not None and abs(last.residual_nt) > vehicle.threshold_nt
@@ -267,6 +275,10 @@ class Identifier:
             loudest = loudest if ended is not None else largest
             if vehicle.small_m >= _ENDS_AFTER_M:
                 ended = self._end_pass(vehicle)
+        if loud:
+            vehicle.approach.clear()
+        else:
+            vehicle.approach.append(sample)
         return Progress(sample=sample, anomaly=present, pass_ended=ended, loudest=loudest, doubted=doubted)
 
     def _take(self, vehicle: _Vehicle, known: Anomaly, sample: Sample, last: Sample | None) -> None:
@@ -284,19 +296,19 @@ class Identifier:
         if vehicle.anomaly is None and last is not None:
             vehicle.anomaly = known
             if not known.under_way:
-                self._begin_rival(vehicle, known, sample, last)
+                self._begin_rival(vehicle, known, sample)
                 known.passes += 1
             known.under_way = True
         elif vehicle.rival is None and last is not None and vehicle.small_m >= _APART_M:
-            self._begin_rival(vehicle, known, sample, last)
+            self._begin_rival(vehicle, known, sample)
         for other in self._vehicles.values():
             if other is not vehicle and other.anomaly is known:
                 other.rival = None  # without the other measurements its known anomaly can't be judged
         known.take(sample)
 
-    def _begin_rival(self, vehicle: _Vehicle, known: Anomaly, sample: Sample, last: Sample) -> None:
+    def _begin_rival(self, vehicle: _Vehicle, known: Anomaly, sample: Sample) -> None:
         """Begin the alternative to a known anomaly with a measurement beyond the threshold."""
-        rival = self._new(sample, last, vehicle.threshold_nt, "rival", self._rivals)
+        rival = self._new(sample, vehicle, "rival", self._rivals)
         vehicle.rival = _Rival(anomaly=rival, kept=copy.deepcopy(known))
         self._rivals += 1
 
@@ -307,6 +319,7 @@ class Identifier:
         self.anomalies = [anomaly for anomaly in self.anomalies if anomaly not in vehicle.doubtful]
         vehicle.doubtful.clear()
         vehicle.began_us, vehicle.last = -1, None  # measurements with that level
+        vehicle.approach.clear()
 
     def _end_pass(self, vehicle: _Vehicle) -> Anomaly:
         """The anomaly whose pass of a vehicle ends: the known one, or its rival."""
@@ -319,6 +332,9 @@ class Identifier:
         passed.restore(rival.kept)
         another = rival.anomaly
         another.number, another.under_way = self.started, False
+        if math.dist(another.place_ne_m, passed.place_ne_m) < _ADJOINING * self._reach_m:
+            passed.adjoin()
+            another.adjoin()
         self._add(another)
         return another
 
@@ -329,8 +345,8 @@ class Identifier:
         near = [entry for entry in found if entry[0] <= self._reach_m]
         return min(near)[2] if near else None
 
-    def _start(self, sample: Sample, last: Sample, threshold_nt: float) -> Anomaly:
-        anomaly = self._new(sample, last, threshold_nt, "anomaly", self.started)
+    def _start(self, sample: Sample, vehicle: _Vehicle) -> Anomaly:
+        anomaly = self._new(sample, vehicle, "anomaly", self.started)
         self._add(anomaly)
         return anomaly
 
@@ -342,16 +358,21 @@ class Identifier:
         self.started += 1
         self.anomalies.append(anomaly)
 
-    def _new(self, sample: Sample, last: Sample, threshold_nt: float, stream: str, index: int) -> Anomaly:
+    def _new(self, sample: Sample, vehicle: _Vehicle, stream: str, index: int) -> Anomaly:
         return Anomaly(
             self.started,
             sample,
             self._parameters,
             self._classes,
             self._map_error,
-            threshold_nt=threshold_nt,
+            threshold_nt=vehicle.threshold_nt,
             field_ned=self._field_ned,
-            # as fast as PCG64 is, and faster for normal numbers, most of the cost of a step
+            # as fast as PCG64 is, and faster for normal numbers
             rng=np.random.Generator(np.random.SFC64(self._streams.child(stream, index))),
-            last=last,
+            approach=tuple(vehicle.approach),
         )
+
+
+def _apart_m(one: Sample, other: Sample) -> float:
+    """Distance between two measurements."""
+    return math.hypot(other.north_m - one.north_m, other.east_m - one.east_m)

@@ -12,6 +12,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from estimators.magnetic_identification.measurements import AT_CORRELATION
 from estimators.occupancy.detection import MapError
 from flightsim.foundation.kernels import kernel
 
@@ -38,8 +39,10 @@ class NoiseLevel:
     def __init__(self, map_error: MapError) -> None:
         self._map_error = map_error
         levels = len(_EXCESS_NT)
-        self._mean_nt: Array = np.zeros(levels)
-        self._variance_nt2: Array = np.full(levels, map_error.sigma_nt**2)
+        # error of the map and its slope, over the rate of the process: alike in size
+        self._means_nt: Array = np.zeros((2, levels))
+        self._covariances_nt2: Array = np.zeros((3, levels))  # of the error, of both, of the slope
+        self._covariances_nt2[::2] = map_error.sigma_nt**2
         self._logs: Array = np.zeros((2, levels))
         self._expected_nt2: tuple[float, float] = (_expected(self._logs, 0), _expected(self._logs, 1))
 
@@ -62,12 +65,12 @@ class NoiseLevel:
         """
         error = self._map_error
         _weigh_levels(
-            self._mean_nt,
-            self._variance_nt2,
+            self._means_nt,
+            self._covariances_nt2,
             self._logs[int(abs(turn_rad) > _TURNING_RAD)],
             residual_nt,
             stated_nt2,
-            math.exp(-moved_m / error.correlation_m),
+            AT_CORRELATION * moved_m / error.correlation_m,
             error.sigma_nt**2,
         )
         self._expected_nt2 = (_expected(self._logs, 0), _expected(self._logs, 1))
@@ -75,31 +78,42 @@ class NoiseLevel:
 
 @kernel
 def _weigh_levels(
-    mean_nt: Array,
-    variance_nt2: Array,
+    means_nt: Array,
+    covariances_nt2: Array,
     logs: Array,
     residual_nt: float,
     stated_nt2: float,
-    decay: float,
+    moved: float,
     map_nt2: float,
 ) -> None:
     """Add a measurement to the evidence of each level, by a Kalman filter of the error of the map for each.
 
     Args:
-        mean_nt, variance_nt2: (levels,) of the error of the map; changed in place.
+        means_nt: (2, levels) of the error of the map and its slope; changed in place.
+        covariances_nt2: (3, levels) likewise: variance of the error, covariance, variance of the slope.
         logs: (levels,) logarithms of the evidences; changed in place.
         residual_nt, stated_nt2: as of `NoiseLevel.take`.
-        decay: factor of the error of the map since the last measurement.
+        moved: distance since the last measurement, over the scale of the error of the map.
         map_nt2: its variance.
     """
-    for k in range(mean_nt.size):
-        mean = decay * mean_nt[k]
-        variance = decay * decay * variance_nt2[k] + (1.0 - decay * decay) * map_nt2
+    # transition of a Matern process with one derivative (Hartikainen and Sarkka 2010)
+    decay = math.exp(-moved)
+    aa, ab, ba, bb = decay * (1.0 + moved), decay * moved, -decay * moved, decay * (1.0 - moved)
+    for k in range(means_nt.shape[1]):
+        error, slope = means_nt[0, k], means_nt[1, k]
+        # beyond the variance of the process, which stays as it is
+        ee, es, ss = covariances_nt2[0, k] - map_nt2, covariances_nt2[1, k], covariances_nt2[2, k] - map_nt2
+        mean, slope = aa * error + ab * slope, ba * error + bb * slope
+        variance = map_nt2 + aa * aa * ee + 2.0 * aa * ab * es + ab * ab * ss
+        shared = aa * ba * ee + (aa * bb + ab * ba) * es + ab * bb * ss
+        of_slope = map_nt2 + ba * ba * ee + 2.0 * ba * bb * es + bb * bb * ss
         total = variance + stated_nt2 + _EXCESS_NT[k] * _EXCESS_NT[k]
         off = residual_nt - mean
         logs[k] = math.exp(-1.0 / _REMEMBERED) * logs[k] - 0.5 * (off * off / total + math.log(total))
-        mean_nt[k] = mean + variance / total * off
-        variance_nt2[k] = variance * (1.0 - variance / total)
+        means_nt[0, k], means_nt[1, k] = mean + variance / total * off, slope + shared / total * off
+        covariances_nt2[0, k] = variance * (1.0 - variance / total)
+        covariances_nt2[1, k] = shared * (1.0 - variance / total)
+        covariances_nt2[2, k] = of_slope - shared * shared / total
 
 
 @kernel

@@ -27,7 +27,12 @@ class IdentificationParameters(Options):
     target_prior: float = option(
         0.5, above=0.0, below=1.0, help="Probability, before any measurement, that an anomaly is a target."
     )
-    particles: int = option(4000, least=100, most=1_000_000, help="Number of particles of each class.")
+    particles: int = option(
+        4000,
+        least=100,
+        most=1_000_000,
+        help="Number of particles of the paper's filter; a hypothesis has 15 % as many sources.",
+    )
     roulette: bool = option(False, help="Resampling by the paper's roulette wheel instead of systematically.")
     interval_s: float = option(
         1.0, above=0.0, help="Time over which readings are averaged for a measurement (paper: 1 s)."
@@ -54,11 +59,11 @@ class IdentificationParameters(Options):
     course_noise_rad: float = option(
         0.02, least=0.0, most=1.0, help="Standard deviation of the course at each measurement."
     )
-    target_speed_m_s: float = option(
-        0.0, least=0.0, help="Largest speed of a moving target, as a random walk."
-    )
+    target_speed_m_s: float = option(0.0, least=0.0, help="Largest speed of a target that moves steadily.")
     unknown_nt: float = option(12.0, above=0.0, help="Standard deviation of anomalies of unknown shape.")
-    unknown_m: float = option(120.0, above=0.0, help="Correlation distance of anomalies of unknown shape.")
+    unknown_m: float = option(
+        120.0, above=0.0, help="Distance over which anomalies of unknown shape are alike."
+    )
     most_anomalies: int = option(
         12, least=1, help="Number of anomalies that are kept; the least probable target is dropped first."
     )

@@ -1,14 +1,10 @@
-"""The particles of one hypothesis as kernels: motion, weights and transformation.
+"""The particles of the paper's filter as kernels: motion, weights and transformation.
 
 Source: Lum, Rysdyk and Pongpunwattana 2005, section III, equations 3 to 8, as corrected in docs/papers.md.
 
 A particle is a column of an array (width, n): each quantity of all particles is contiguous, so that the
 compiler vectorizes the loops. A column begins with the pose of the vehicle in the frame of the source: x
 along the source's axis, y to its right, and the course psi relative to that axis, kept as cosine and sine.
-
-What the measurement depends on linearly is not sampled: a Kalman filter in each column has the factors of the
-signature's terms and, as the last one, the error of the map (Rao-Blackwellization; Doucet, Godsill and
-Andrieu 2000). With spreads of zero its innovation is the paper's residual.
 """
 
 import math
@@ -30,28 +26,6 @@ COS: Final = _pose.place()
 SIN: Final = _pose.place()
 POSE: Final = _pose.size
 
-_gaussian = Slots(POSE)
-PER_ALONG: Final = _gaussian.place()  # one over the standard deviation along the axis, 1/m
-PER_ACROSS: Final = _gaussian.place()
-AMPLITUDE: Final = _gaussian.place()  # mean of the amplitude, over the expected one
-MAP: Final = _gaussian.place()  # mean of the error of the map, nT
-AMPLITUDE_VAR: Final = _gaussian.place()
-AMPLITUDE_MAP: Final = _gaussian.place()
-MAP_VAR: Final = _gaussian.place()
-GAUSSIAN: Final = _gaussian.size
-
-TERMS: Final = 4  # linear terms of a dipole: its strength north, east and down, and the error of the map
-COVARIANCES: Final = TERMS * (TERMS + 1) // 2
-_dipole = Slots(POSE)
-HEIGHT: Final = _dipole.place()  # of the dipole above the map's home
-RANGE: Final = _dipole.place()  # distance at which the strength is stated
-MEANS: Final = _dipole.place(TERMS)
-COVARIANCE: Final = _dipole.place(COVARIANCES)  # the upper triangle, row by row: NN, NE, ND, NM, EE, ...
-STRENGTH_VARIANCES: Final = (COVARIANCE, COVARIANCE + 4, COVARIANCE + 7)
-DIPOLE_MAP_VAR: Final = COVARIANCE + COVARIANCES - 1
-DIPOLE: Final = _dipole.size
-
-_LOG_2PI: Final = math.log(2.0 * math.pi)
 _LEAST_SUM: Final = 1e-200  # smaller sums of weights have lost digits
 
 
@@ -72,7 +46,7 @@ def move(
     particle side by side, so these four are seldom alike.
 
     Args:
-        particles: (width, n), changed in place.
+        particles: (POSE, n), changed in place.
         forward_m, right_m: displacement of the vehicle along and across its course before the step.
         turn_rad: change of its course.
         noise: (2, a quarter of n or more) standard normal.
@@ -134,182 +108,53 @@ def _move_part(
 
 
 @kernel(error_model="numpy")
-def weigh_gaussian(
+def weigh(
     particles: Array,
     weights: Array,
-    amplitude_nt: float,
+    signature: tuple[float, float, float],
     measured_nt: float,
-    white_nt2: float,
-    decay: float,
-    drive_nt2: float,
+    variance_nt2: float,
     fits: Array,
-) -> tuple[float, float, float]:
-    """Update the particles of a Gaussian signature by a measurement: weights (5), (6), and linear factors.
+) -> float:
+    """Weights (5), (6) by a measurement.
 
     The exponential is the only part that is not vectorized, and therefore has a loop of its own.
 
     Args:
-        particles: (GAUSSIAN, n), changed in place.
+        particles: (POSE, n).
         weights: (n,) before the measurement; after it, likewise with sum one.
-        amplitude_nt: what the particles' amplitudes are relative to.
+        signature: amplitude, nT, and one over the standard deviations along and across the axis, 1/m.
         measured_nt: reading less map, less level.
-        white_nt2: variance of the white noise of the measurement.
-        decay, drive_nt2: of the error of the map since the last measurement: its factor, and the variance
-            that is added.
-        fits: (3, n) to work in.
+        variance_nt2: of that measurement.
+        fits: (n,) to work in.
 
     Returns:
-        As `_next_weights`.
+        The paper's confidence (7), each weight over its greatest possible value: the mean of exp(-fit / 2),
+        where the fit is the squared residual over its variance.
     """
-    terms = fits[0]
+    amplitude_nt, per_along, per_across = signature
     for m in range(weights.size):
-        along, across = particles[X, m] * particles[PER_ALONG, m], particles[Y, m] * particles[PER_ACROSS, m]
-        terms[m] = -0.5 * (along * along + across * across)
+        along, across = particles[X, m] * per_along, particles[Y, m] * per_across
+        fits[m] = -0.5 * (along * along + across * across)
     for m in range(weights.size):
-        terms[m] = amplitude_nt * math.exp(terms[m])
+        fits[m] = amplitude_nt * math.exp(fits[m])
     for m in range(weights.size):
-        term = fits[0, m]
-        map_nt = decay * particles[MAP, m]
-        aa, ab, bb = (
-            particles[AMPLITUDE_VAR, m],
-            decay * particles[AMPLITUDE_MAP, m],
-            decay * decay * particles[MAP_VAR, m] + drive_nt2,
-        )
-        residual_nt = measured_nt - term * particles[AMPLITUDE, m] - map_nt
-        gain_a, gain_b = term * aa + ab, term * ab + bb
-        total = term * gain_a + gain_b + white_nt2
-        per_total = 1.0 / total
-        share = residual_nt * per_total
-        particles[AMPLITUDE, m] += gain_a * share
-        particles[MAP, m] = map_nt + gain_b * share
-        particles[AMPLITUDE_VAR, m] = aa - gain_a * gain_a * per_total
-        particles[AMPLITUDE_MAP, m] = ab - gain_a * gain_b * per_total
-        particles[MAP_VAR, m] = bb - gain_b * gain_b * per_total
-        fits[0, m] = residual_nt * share
-        fits[1, m] = total
-        fits[2, m] = residual_nt
-    return _next_weights(weights, fits)
-
-
-@kernel(error_model="numpy")
-def weigh_dipole(
-    particles: Array,
-    weights: Array,
-    field: Array,
-    height_m: float,
-    measured_nt: float,
-    white_nt2: float,
-    decay: float,
-    drive_nt2: float,
-    fits: Array,
-) -> tuple[float, float, float]:
-    """Update the particles of a dipole; its frame is north and east, as its moment has any direction.
-
-    The anomaly is the part of B = mu_0 / 4 pi (3 (m r) r / r^5 - m / r^3) along the Earth's field (Blakely
-    1995, section 8.3): linear in the moment. The Kalman filter is written out term by term, so that the
-    compiler vectorizes the loop.
-
-    Args:
-        particles: (DIPOLE, n), changed in place.
-        field: (3,) direction of the Earth's field, NED.
-        height_m: of the sensor above the map's home.
-        weights, measured_nt, white_nt2, decay, drive_nt2, fits: as of `weigh_gaussian`.
-
-    Returns:
-        As `_next_weights`.
-    """
-    field_n, field_e, field_d = field[0], field[1], field[2]
-    c = COVARIANCE
+        residual_nt = measured_nt - fits[m]
+        fits[m] = residual_nt * residual_nt / variance_nt2
+    confidence = 0.0
     for m in range(weights.size):
-        x, y = particles[X, m], particles[Y, m]
-        up = max(1.0, height_m - particles[HEIGHT, m])
-        distance2 = x * x + y * y + up * up
-        reach = particles[RANGE, m]
-        scale = reach * reach * reach / (distance2 * math.sqrt(distance2))
-        along = 3.0 * (x * field_n + y * field_e - up * field_d) / distance2
-        term_n = scale * (along * x - field_n)
-        term_e = scale * (along * y - field_e)
-        term_d = scale * (-along * up - field_d)
-        map_nt = decay * particles[MEANS + 3, m]
-        nn, ne, nd = particles[c, m], particles[c + 1, m], particles[c + 2, m]
-        ee, ed, dd = particles[c + 4, m], particles[c + 5, m], particles[c + 7, m]
-        nm, em, dm = decay * particles[c + 3, m], decay * particles[c + 6, m], decay * particles[c + 8, m]
-        mm = decay * decay * particles[c + 9, m] + drive_nt2
-        gain_n = term_n * nn + term_e * ne + term_d * nd + nm
-        gain_e = term_n * ne + term_e * ee + term_d * ed + em
-        gain_d = term_n * nd + term_e * ed + term_d * dd + dm
-        gain_m = term_n * nm + term_e * em + term_d * dm + mm
-        residual_nt = (
-            measured_nt
-            - term_n * particles[MEANS, m]
-            - term_e * particles[MEANS + 1, m]
-            - term_d * particles[MEANS + 2, m]
-            - map_nt
-        )
-        total = term_n * gain_n + term_e * gain_e + term_d * gain_d + gain_m + white_nt2
-        per_total = 1.0 / total
-        share = residual_nt * per_total
-        particles[MEANS, m] += gain_n * share
-        particles[MEANS + 1, m] += gain_e * share
-        particles[MEANS + 2, m] += gain_d * share
-        particles[MEANS + 3, m] = map_nt + gain_m * share
-        particles[c, m] = nn - gain_n * gain_n * per_total
-        particles[c + 1, m] = ne - gain_n * gain_e * per_total
-        particles[c + 2, m] = nd - gain_n * gain_d * per_total
-        particles[c + 3, m] = nm - gain_n * gain_m * per_total
-        particles[c + 4, m] = ee - gain_e * gain_e * per_total
-        particles[c + 5, m] = ed - gain_e * gain_d * per_total
-        particles[c + 6, m] = em - gain_e * gain_m * per_total
-        particles[c + 7, m] = dd - gain_d * gain_d * per_total
-        particles[c + 8, m] = dm - gain_d * gain_m * per_total
-        particles[c + 9, m] = mm - gain_m * gain_m * per_total
-        fits[0, m] = residual_nt * share
-        fits[1, m] = total
-        fits[2, m] = residual_nt
-    return _next_weights(weights, fits)
-
-
-@kernel(error_model="numpy")
-def _next_weights(weights: Array, fits: Array) -> tuple[float, float, float]:
-    """Multiply the weights by the likelihoods, and normalize them.
-
-    Args:
-        weights: (n,), changed in place.
-        fits: (3, n) squared innovation over its variance, that variance, nT^2, and the innovation, nT.
-
-    Returns:
-        Logarithm of the measurement's density given those before it, 1/nT; the paper's confidence (7), each
-        weight over its greatest possible value: the mean of exp(-fit / 2); and the square of the difference
-        between measurement and prediction of all particles together, over its variance.
-    """
-    count = weights.size
-    mean = square = 0.0
-    for m in range(count):
-        mean += weights[m] * fits[2, m]
-        square += weights[m] * (fits[2, m] * fits[2, m] + fits[1, m])
-    misfit = mean * mean / (square - mean * mean)
-    confidence = summed = 0.0
-    for m in range(count):
-        weights[m] *= math.exp(-0.5 * fits[0, m])
+        weights[m] *= math.exp(-0.5 * fits[m])
         confidence += weights[m]
-    for m in range(count):
-        weights[m] /= math.sqrt(fits[1, m])
-    for m in range(count):
-        summed += weights[m]
-    before = 0.0
-    if summed < _LEAST_SUM:  # no particle is near: only the best fits count
-        best = fits[0].min()
-        before, summed = -0.5 * best, 0.0
-        for m in range(count):
-            weights[m] = math.exp(-0.5 * (fits[0, m] - best)) / math.sqrt(fits[1, m])
-            summed += weights[m] / count
-        for m in range(count):
-            weights[m] /= summed * count
-        return before + math.log(summed) - 0.5 * _LOG_2PI, confidence, misfit
-    per_sum = 1.0 / summed
-    for m in range(count):
-        weights[m] *= per_sum
-    return math.log(summed) - 0.5 * _LOG_2PI, confidence, misfit
+    total = confidence
+    if confidence < _LEAST_SUM:  # no particle is near: only the best fits count
+        best = fits.min()
+        total = 0.0
+        for m in range(weights.size):
+            weights[m] = math.exp(-0.5 * (fits[m] - best))
+            total += weights[m]
+    for m in range(weights.size):
+        weights[m] /= total
+    return confidence
 
 
 @kernel
@@ -325,7 +170,7 @@ def relative_sources(particles: Array, out: Array) -> None:
     """Equation 8 in the project's frames: the source in the frame of the vehicle.
 
     Args:
-        particles: (width, n).
+        particles: (POSE, n).
         out: (n, 3) forward and right of the vehicle's course, and the source's axis relative to that course,
             clockwise, -pi..pi.
     """

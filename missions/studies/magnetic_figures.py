@@ -68,11 +68,11 @@ def draw_passes(path: Path, flown: DiagonalPass, traces: Sequence[tuple[bool, Ar
     figure = blank_figure(12.0, 9.0, dpi=130)
     in_target, in_vehicle, angles, confidence = figure.subplots(2, 2).ravel()
     rng = np.random.default_rng(0)
-    count = len(flown.hypothesis.weights)
+    count = len(flown.filter.weights)
     shown = rng.choice(count, min(count, _DOTS), replace=False)
-    chosen = rng.choice(count, min(count, _DOTS), p=flown.hypothesis.weights)
+    chosen = rng.choice(count, min(count, _DOTS), p=flown.filter.weights)
     _draw_in_target(in_target, flown, shown, chosen)
-    sources = flown.hypothesis.sources()[chosen]
+    sources = flown.filter.sources()[chosen]
     in_vehicle.plot(sources[:, 1], sources[:, 0], ".", color=_TARGET_COLOUR, markersize=2, alpha=0.4)
     in_vehicle.plot(0.0, 0.0, "^", color=INK, markersize=9)
     in_vehicle.plot(0.0, -BEYOND_M, "+", color=_TRUTH_COLOUR, markersize=12, markeredgewidth=1.8)
@@ -80,9 +80,7 @@ def draw_passes(path: Path, flown: DiagonalPass, traces: Sequence[tuple[bool, Ar
     in_vehicle.set_xlim(-1500.0, 1500.0)
     _title(in_vehicle, "the target, seen from the vehicle (8)", "right, m", "forward, m")
     psi_deg = np.degrees(flown.ended[:, 2])
-    angles.hist(
-        psi_deg, bins=180, range=(-180.0, 180.0), weights=flown.hypothesis.weights, color=_TARGET_COLOUR
-    )
+    angles.hist(psi_deg, bins=180, range=(-180.0, 180.0), weights=flown.filter.weights, color=_TARGET_COLOUR)
     for sign in (-1.0, 1.0):
         for angle in (math.degrees(DIAGONAL_RAD), 180.0 - math.degrees(DIAGONAL_RAD)):
             angles.axvline(sign * angle, color=_TRUTH_COLOUR, linewidth=0.9, linestyle="--")

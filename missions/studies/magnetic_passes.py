@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from estimators.magnetic_identification import particles as p
 from estimators.magnetic_identification.classes import GaussianClass
-from estimators.magnetic_identification.hypotheses import Control, Measurement
-from estimators.magnetic_identification.particle_hypotheses import GaussianHypothesis
+from estimators.magnetic_identification.confidence import ConfidenceFilter, Control
 from estimators.magnetic_identification.samples import TracePoint
 from missions.embedded.magnetic_encounters import EncounterConditions, encounters
 from missions.studies.magnetic_trial import anomalies_of
@@ -40,7 +39,7 @@ _BEFORE_M: Final = 5000.0
 _NOISE_NT: Final = 0.5
 _THRESHOLD_NT: Final = 3.0
 _FORWARD_M, _TURN_RAD = 0.5, 0.015
-_HEIGHT_M: Final = 80.0
+_WHITE_NT2: Final = 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,18 +49,18 @@ class DiagonalPass:
     Attributes:
         began: (n, 3) x and y in the frame of the target, m, and psi, of the particles at the first
             measurement beyond the threshold.
-        hypothesis: the filter at the end.
+        filter: at the end.
         began_along_m: place of that measurement along the track, from the centre.
     """
 
     began: Array
-    hypothesis: GaussianHypothesis
+    filter: ConfidenceFilter
     began_along_m: float
 
     @property
     def ended(self) -> Array:
         """(n, 3) as `began`, at the end."""
-        return _poses(self.hypothesis)
+        return _poses(self.filter)
 
 
 def diagonal_pass(seed: int, particles: int, *, by_roulette: bool = False) -> DiagonalPass:
@@ -73,35 +72,25 @@ def diagonal_pass(seed: int, particles: int, *, by_roulette: bool = False) -> Di
         by_roulette: resample as the paper does.
     """
     rng = np.random.Generator(np.random.SFC64(seed))
-    hypothesis = GaussianHypothesis(TARGET, particles, rng, by_roulette=by_roulette)
+    paper = ConfidenceFilter(TARGET, particles, rng, by_roulette=by_roulette)
     along_m = np.arange(-_BEFORE_M, BEYOND_M + 1.0, _STEP_M)
     square = (along_m * math.cos(DIAGONAL_RAD) / TARGET.sigma_along_m) ** 2
     square += (along_m * math.sin(DIAGONAL_RAD) / TARGET.sigma_across_m) ** 2
     noise_nt = _NOISE_NT * np.random.default_rng(seed).standard_normal(len(along_m))
     values = TARGET.amplitude_nt * np.exp(-0.5 * square) + noise_nt
     first = int(np.flatnonzero(values > _THRESHOLD_NT)[0])
-    hypothesis.start(_measurement(values[first]), 0.0)
-    began = _poses(hypothesis)
+    paper.start(float(values[first]), _WHITE_NT2)
+    began = _poses(paper)
     control = Control(
-        forward_m=_STEP_M,
-        right_m=0.0,
-        turn_rad=0.0,
-        forward_sigma_m=_FORWARD_M,
-        turn_sigma_rad=_TURN_RAD,
-        decay=0.0,
-        drive_nt2=0.0,
+        forward_m=_STEP_M, right_m=0.0, turn_rad=0.0, forward_sigma_m=_FORWARD_M, turn_sigma_rad=_TURN_RAD
     )
     for value in values[first + 1 :].tolist():
-        hypothesis.step(control, _measurement(value))
-    return DiagonalPass(began=began, hypothesis=hypothesis, began_along_m=float(along_m[first]))
+        paper.step(control, value, _WHITE_NT2)
+    return DiagonalPass(began=began, filter=paper, began_along_m=float(along_m[first]))
 
 
-def _measurement(value: float) -> Measurement:
-    return Measurement(residual_nt=float(value), white_nt2=1.0, height_m=_HEIGHT_M, course_rad=0.0)
-
-
-def _poses(hypothesis: GaussianHypothesis) -> Array:
-    x, y, cosine, sine = (hypothesis.particles[k] for k in (p.X, p.Y, p.COS, p.SIN))
+def _poses(paper: ConfidenceFilter) -> Array:
+    x, y, cosine, sine = (paper.particles[k] for k in (p.X, p.Y, p.COS, p.SIN))
     return np.column_stack((x, y, np.arctan2(sine, cosine)))
 
 

@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 
-from estimators.magnetic_identification.hypotheses import Control, Measurement
 from estimators.occupancy.placed_readings import PlacedReading
 from flightsim.payload import DipoleSignature, GaussianSignature
 
@@ -79,21 +78,3 @@ def readings(rng, places, signatures, *, start_us=0, rate_hz=10):
         )
         for k, ((north, east), value) in enumerate(zip(places, values, strict=True))
     ]
-
-
-def straight(step_m, *, noise=False, map_nt=MAP_NT):
-    """The control of a straight step."""
-    decay = math.exp(-step_m / CORRELATION_M)
-    return Control(
-        forward_m=step_m,
-        right_m=0.0,
-        turn_rad=0.0,
-        forward_sigma_m=0.02 * step_m if noise else 0.0,
-        turn_sigma_rad=0.02 if noise else 0.0,
-        decay=decay,
-        drive_nt2=(1.0 - decay**2) * map_nt**2,
-    )
-
-
-def measurement(residual_nt, *, course_rad=0.0, white_nt2=NOISE_NT**2):
-    return Measurement(residual_nt=residual_nt, white_nt2=white_nt2, height_m=HEIGHT_M, course_rad=course_rad)
