@@ -62,7 +62,7 @@ class OrbitTargetParameters(TrackerParameters):
     target_east_m: float | None = option(
         None, varies="the first detection", help="Place east of home where the target is expected."
     )
-    target_speed_m_s: float = option(0.0, least=0.0, help="Expected speed of the target.")
+    target_speed_m_s: float = option(0.0, least=0.0, most=15.0, help="Expected speed of the target.")
     target_heading_rad: float = option(0.0, help="Direction in which the target is expected to move.")
     target_sigma_m: float = option(
         20.0, above=0.0, help="Standard deviation of the expected place (paper: 20 m)."

@@ -146,7 +146,8 @@ def _verdicts(stated: Array, with_target: bool) -> dict[str, Any]:
         known = np.isfinite(after)
         found[key] = calibration_of(after, happened)
         found[f"{key}_gap"] = calibration_gap(found[key])
-        found["brier"] = rounded(float(np.mean((after[known] - happened[known]) ** 2)))
+        squared = (after[known] - happened[known]) ** 2
+        found["brier"] = rounded(float(np.mean(squared))) if len(squared) else None
     return found
 
 

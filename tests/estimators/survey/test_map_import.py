@@ -395,7 +395,7 @@ def test_the_command_makes_a_map_and_names_its_options(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        (["--height", "nan"], "'--height': nan is not a finite number"),
+        (["--height", "nan"], "--height nan is not a finite number"),
         (["--home", "47.4,8.5"], "--home '47.4,8.5' is not three numbers; accepted is LAT,LON,ALT"),
         (["--home", "95,8.5,0"], "--home '95,8.5,0': latitude 95.0 deg is not in -90..90; accepted is"),
         (["--column", "9"], "has no --column '9'; there are 1"),
