@@ -93,9 +93,6 @@ SMALL = {
 }
 
 
-QUICK = ("sector",)  # of the default suite
-
-
 def request(name: str, seed: int, out: Path) -> RunRequest:
     options, world = SMALL.get(name, pattern)(seed)
     return RunRequest(options=options, world=world, out=out, picture=False)
@@ -108,9 +105,8 @@ def reported(result: RunResult) -> Any:
     return result.outcome, result.reason, summary, result.report.lines
 
 
-@pytest.mark.parametrize(
-    "name", [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in MISSIONS]
-)
+@pytest.mark.parametrize("name", MISSIONS)
+@pytest.mark.slow
 def test_a_flight_within_a_flight_changes_neither(name: str, tmp_path: Path) -> None:
     """The second flight begins and ends while the first one is under way."""
     alone = [reported(fly(name, request(name, seed, tmp_path / f"alone{seed}"))) for seed in (1, 2)]
