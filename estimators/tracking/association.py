@@ -29,12 +29,13 @@ def assign(cost: Array) -> NDArray[np.int64]:
     if not np.all(np.isfinite(cost)):
         raise ValueError("a cost is not finite; give a forbidden pair a large cost")
     column_of = np.zeros(cost.shape[0], dtype=np.int64)
-    _assign(np.ascontiguousarray(cost, dtype=np.float64), column_of)
+    assign_rows(np.ascontiguousarray(cost, dtype=np.float64), column_of)
     return column_of
 
 
 @kernel
-def _assign(cost: Array, column_of: NDArray[np.int64]) -> None:
+def assign_rows(cost: Array, column_of: NDArray[np.int64]) -> None:
+    """`assign` within kernels, without its checks: (n, m) costs, (n,) column of each row as the result."""
     rows, columns = cost.shape
     row_price, column_price = np.zeros(rows + 1), np.zeros(columns + 1)
     row_of = np.full(columns + 1, rows)  # the last column and the last row are the start of each path

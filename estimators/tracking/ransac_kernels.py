@@ -10,6 +10,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from estimators.tracking.association import assign_rows
 from flightsim.foundation.kernels import kernel
 
 Array = NDArray[np.float64]
@@ -144,10 +145,8 @@ def associate(
 
 @kernel
 def assign(scores: Array, rivals: Flags, missed: float, shared: Array, found: Flags) -> None:
-    """Assign measurements to tracks, so that the product of the likelihoods is greatest (shortest augmenting
-    paths: Jonker and Volgenant 1987, "A shortest augmenting path algorithm for dense and sparse linear
-    assignment problems"), and take them from all other tracks. Without a measurement in the gates of two
-    tracks nothing is done.
+    """Assign measurements to tracks, so that the product of the likelihoods is greatest, and take them from
+    all other tracks. Without a measurement in the gates of two tracks nothing is done.
 
     Args:
         scores: (m, n) likelihoods, 0 outside of the gate; changed.
@@ -167,43 +166,18 @@ def assign(scores: Array, rivals: Flags, missed: float, shared: Array, found: Fl
     if not disputed:
         return
     size = rows.size
-    columns = total + size  # a column for each track without a measurement
-    costs = np.full((size + 1, columns + 1), 1e6)  # row and column 0 are those of the search
+    costs = np.full((size, total + size), 1e6)  # with a column for each track without a measurement
     for r in range(size):
         for i in range(total):
             if scores[rows[r], i] > 0.0:
-                costs[r + 1, i + 1] = -math.log(scores[rows[r], i] / missed)
-        costs[r + 1, total + r + 1] = 0.0
-    by_row, by_column = np.zeros(size + 1), np.zeros(columns + 1)
-    taken, way = np.zeros(columns + 1, np.int64), np.zeros(columns + 1, np.int64)
-    for r in range(1, size + 1):
-        taken[0], column = r, 0
-        least, used = np.full(columns + 1, np.inf), np.zeros(columns + 1, np.bool_)
-        while taken[column]:
-            used[column] = True
-            row, step, following = taken[column], np.inf, 0
-            for j in range(1, columns + 1):
-                if used[j]:
-                    continue
-                reduced = costs[row, j] - by_row[row] - by_column[j]
-                if reduced < least[j]:
-                    least[j], way[j] = reduced, column
-                if least[j] < step:
-                    step, following = least[j], j
-            for j in range(columns + 1):
-                if used[j]:
-                    by_row[taken[j]] += step
-                    by_column[j] -= step
-                else:
-                    least[j] -= step
-            column = following
-        while column:
-            taken[column] = taken[way[column]]
-            column = way[column]
-    for i in range(total):
-        if not taken[i + 1] or scores[rows[taken[i + 1] - 1], i] <= 0.0:
+                costs[r, i] = -math.log(scores[rows[r], i] / missed)
+        costs[r, total + r] = 0.0
+    column_of = np.zeros(size, np.int64)
+    assign_rows(costs, column_of)
+    for r in range(size):
+        i, owner = column_of[r], rows[r]
+        if i >= total or scores[owner, i] <= 0.0:
             continue
-        owner = rows[taken[i + 1] - 1]
         for k in rows:
             if k != owner:
                 scores[k, i] = 0.0
