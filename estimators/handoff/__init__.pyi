@@ -8,11 +8,11 @@ from estimators.handoff.comparison import TrackWindows as TrackWindows
 from estimators.handoff.dead_reckoning import DeadReckoning as DeadReckoning
 from estimators.handoff.dead_reckoning import TrackHistory as TrackHistory
 from estimators.handoff.designation import Designation as Designation
-from estimators.handoff.designation import DesignationParameters as DesignationParameters
 from estimators.handoff.estimate import HandoffEstimate as HandoffEstimate
 from estimators.handoff.estimator import HandoffEstimator as HandoffEstimator
 from estimators.handoff.evidence import EvidenceComparison as EvidenceComparison
 from estimators.handoff.evidence import EvidenceParameters as EvidenceParameters
+from estimators.handoff.identities import DesignationParameters as DesignationParameters
 from estimators.handoff.matching import Match as Match
 from estimators.handoff.matching import MatchComparison as MatchComparison
 from estimators.handoff.matching import MatchingParameters as MatchingParameters

@@ -17,117 +17,22 @@ managing multi-target identities in wireless ad-hoc sensor networks"). It change
 """
 
 import math
-from collections import deque
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 
-from estimators.handoff.appearance import Appearance, AppearanceParameters, Look, Looks
-from flightsim.foundation.checks import Positive, Share
-from flightsim.foundation.options import Options
+from estimators.handoff.appearance import Appearance, Look
+from estimators.handoff.identities import (
+    DesignationParameters,
+    LivingTrack,
+    LostTarget,
+    exchange,
+    give,
+    unexchanged,
+)
 from flightsim.foundation.vectors import LevelVector
 
 _NO_LOOKS: Mapping[int, Look] = {}
 _MEASURED_US = 1_000_000
 _CERTAIN = 0.95  # the looks of a track that is the target with this probability are the target's
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DesignationParameters(Options):
-    """When an identity becomes doubtful, and when it is found again.
-
-    Attributes:
-        exchange_m: a track that comes as near as this to another one has exchanged targets with it with a
-            probability of 0.5 exp(-1/2).
-        beside_m: a track that begins this close to a living one may be of the same target.
-        doubled: probability that it is, if no target is lost there; in none of 252 frames was such a track
-            of another target. It must leave room for a decision at 0.99.
-        merged_m: a track that ends at this distance from another one was of the same target as that one with
-            a probability of exp(-1/2).
-        lost_sigma_m, lost_sigma_m_s: standard deviations per axis of the place and of the velocity of a
-            target when its track is lost.
-        speed_m_s, turn_s: the same of a walker's velocity per axis, and its correlation time.
-        elsewhere: probability that a lost target is anywhere in the area.
-        area_m2: of the area.
-        untracked: mean number of other targets without a track, lost ones not counted, in the area.
-        found_s: mean time after which a moving target in view has a track.
-        unseen: probability that a lost target gets none: it stands still, or is out of view.
-        forget_s: time after which a lost track that is not the target is forgotten.
-        lost_s: time without a track after which the target is lost, and a designation is needed.
-        least: a track with a smaller probability is not reported as the target.
-        appearance: spread of looks.
-        alone_m: looks count only while no other track is nearer.
-    """
-
-    exchange_m: Positive = 2.0
-    beside_m: Positive = 12.5
-    doubled: Share = 0.998
-    merged_m: Positive = 4.0
-    lost_sigma_m: Positive = 3.0
-    lost_sigma_m_s: Positive = 0.5
-    speed_m_s: Positive = 1.0
-    turn_s: Positive = 20.0
-    elsewhere: Share = 0.05
-    area_m2: Positive = 40_000.0
-    untracked: Positive = 1.0
-    found_s: Positive = 10.0
-    unseen: Share = 0.05
-    forget_s: Positive = 30.0
-    lost_s: Positive = 60.0
-    least: Share = 0.2
-    appearance: AppearanceParameters = field(default_factory=AppearanceParameters)
-    alone_m: Positive = 6.0
-
-
-_State = tuple[int, LevelVector, LevelVector]
-
-
-@dataclass(slots=True, kw_only=True)
-class _Living:
-    """A track.
-
-    Attributes:
-        weight: probability that it is the target, without the looks that have not been counted.
-        place, velocity: smoothed.
-        looks: since it has been alone; None: none yet.
-        beside: living tracks beside which it began, and from which it has not been away, with the probability
-            that both are of one target.
-        begun: time and place of its beginning.
-        doubtful: it has been measured seldom lately.
-        measured: times, places and velocities while it was measured often, a second apart: the newest two.
-        nearest: least distance of other tracks in the present encounter, by number.
-    """
-
-    weight: float
-    place: LevelVector
-    velocity: LevelVector = (0.0, 0.0)
-    looks: Looks | None = None
-    beside: dict[int, float] = field(default_factory=dict)
-    begun: tuple[int, LevelVector] = (0, (0.0, 0.0))
-    doubtful: bool = False
-    measured: deque[_State] = field(default_factory=lambda: deque(maxlen=2))
-    nearest: dict[int, float] = field(default_factory=dict)
-
-
-@dataclass(slots=True, kw_only=True)
-class _Lost:
-    """A target that had a track.
-
-    Attributes:
-        weight: probability that it is the designated one.
-        exists: probability that no new track is of it.
-        since_us: time at which its track was lost.
-        place, velocity: at that time.
-        sigma_m_s: standard deviation per axis of the velocity.
-        counted: probability of no track since then that is in the weight already.
-    """
-
-    weight: float
-    exists: float
-    since_us: int
-    place: LevelVector
-    velocity: LevelVector = (0.0, 0.0)
-    sigma_m_s: float
-    counted: float = 1.0
 
 
 class Designation:
@@ -149,8 +54,8 @@ class Designation:
         self.count = 0
         self._time_us = 0
         self._seen_us = 0
-        self._living: dict[int, _Living] = {}
-        self._lost: list[_Lost] = []
+        self._living: dict[int, LivingTrack] = {}
+        self._lost: list[LostTarget] = []
         self._appearance = Appearance(self.parameters.appearance)
 
     def designate(
@@ -170,7 +75,7 @@ class Designation:
             doubles: other tracks that are of the same target.
         """
         self._count_looks()
-        known = self._living.setdefault(number, _Living(weight=0.0, place=place))
+        known = self._living.setdefault(number, LivingTrack(weight=0.0, place=place))
         others = [entry for entry in self._entries() if entry is not known]
         if not others and sure < 1.0:  # then the target is one that has no track
             unseen = self._without_track(0.0, time_us, place)
@@ -204,17 +109,19 @@ class Designation:
         # a track of it may have ended shortly before: there is one target, and not two
         near_m = self.parameters.beside_m
         self._lost = [
-            lost for lost in self._lost if math.dist(self._walked(lost, time_us)[0], place) > near_m
+            lost
+            for lost in self._lost
+            if math.dist(lost.place_at(time_us, self.parameters)[0], place) > near_m
         ]
         self._lost.append(self._without_track(sure, time_us, place))
         self.count += 1
         self._seen_us = time_us
         self._choose()
 
-    def _without_track(self, weight: float, time_us: int, place: LevelVector) -> _Lost:
+    def _without_track(self, weight: float, time_us: int, place: LevelVector) -> LostTarget:
         """A target that has had no track yet, somewhere near a place."""
         speed_m_s = self.parameters.speed_m_s
-        return _Lost(weight=weight, exists=1.0, since_us=time_us, place=place, sigma_m_s=speed_m_s)
+        return LostTarget(weight=weight, exists=1.0, since_us=time_us, place=place, sigma_m_s=speed_m_s)
 
     def refuse(self, number: int, sure: float = 1.0) -> None:
         """An operator says that a track is not the target.
@@ -277,7 +184,7 @@ class Designation:
         lost = max(self._lost, key=lambda lost: lost.weight, default=None)
         if lost is None or not lost.weight or self.lost_s > self.parameters.lost_s:
             return None
-        return self._walked(lost, self._time_us)[0]
+        return lost.place_at(self._time_us, self.parameters)[0]
 
     @property
     def lost_s(self) -> float:
@@ -291,7 +198,7 @@ class Designation:
             return frozenset()
         return frozenset(track.beside.keys() | {k for k, t in self._living.items() if number in t.beside})
 
-    def _entries(self) -> list[_Living | _Lost]:
+    def _entries(self) -> list[LivingTrack | LostTarget]:
         return [*self._living.values(), *self._lost]
 
     # what changes the probabilities
@@ -306,18 +213,18 @@ class Designation:
             for k, other in self._living.items():
                 doubled = max(other.beside.pop(number, 0.0), track.beside.get(k, 0.0))
                 if doubled:
-                    self._give(track, other, doubled)
+                    give(track, other, doubled)
                     self._claim(k, 1.0 - doubled)
                 elif k in track.nearest:
                     away = math.dist(track.place, other.place) / self.parameters.merged_m
-                    _exchange(track, other, 0.5 * math.exp(-0.5 * away * away))
+                    exchange(track, other, 0.5 * math.exp(-0.5 * away * away))
                 other.nearest.pop(number, None)
             # a track that was hardly measured has left its target before, which may have another one already
             since_us, place, velocity = time_us, track.place, track.velocity
             if track.doubtful and track.measured:
                 since_us, place, velocity = track.measured[0]
             self._lost.append(
-                _Lost(
+                LostTarget(
                     weight=track.weight,
                     exists=1.0,
                     since_us=since_us,
@@ -329,12 +236,6 @@ class Designation:
             for k, other in self._living.items():
                 if other.begun[0] >= since_us and not other.beside:
                     self._claim(k, 1.0, self._lost[-1])
-
-    @staticmethod
-    def _give(track: _Living, other: _Living, share: float) -> None:
-        """Give a share of the probability of a track to another one."""
-        moved = share * track.weight
-        track.weight, other.weight = track.weight - moved, other.weight + moved
 
     def _move(
         self, time_us: int, dt_s: float, places: Mapping[int, LevelVector], doubtful: frozenset[int]
@@ -358,7 +259,7 @@ class Designation:
         p = self.parameters
         for number in sorted(places.keys() - self._living.keys()):
             place = places[number]
-            new = _Living(weight=0.0, place=place, begun=(time_us, place))
+            new = LivingTrack(weight=0.0, place=place, begun=(time_us, place))
             near = [k for k, track in self._living.items() if math.dist(track.place, place) <= p.beside_m]
             self._living[number] = new
             if not near:
@@ -369,15 +270,15 @@ class Designation:
             doubles = p.doubled / (1.0 - p.doubled) * p.untracked / p.area_m2
             new.beside = dict.fromkeys(near, doubles / (doubles + other))
 
-    def _densities(self, track: _Living) -> list[float]:
+    def _densities(self, track: LivingTrack) -> list[float]:
         """Densities of the lost targets at the beginning of a track."""
         time_us, place = track.begun
         return [
-            lost.exists * self._density(lost, time_us, place) if lost.since_us <= time_us else 0.0
+            lost.exists * lost.density(time_us, place, self.parameters) if lost.since_us <= time_us else 0.0
             for lost in self._lost
         ]
 
-    def _claim(self, number: int, real: float, of: _Lost | None = None) -> None:
+    def _claim(self, number: int, real: float, of: LostTarget | None = None) -> None:
         """A track is of a lost target, or of another one that had no track.
 
         Args:
@@ -395,33 +296,6 @@ class Designation:
             track.weight += share * lost.weight
             lost.weight -= share * lost.weight
             lost.exists *= 1.0 - share
-
-    def _walked(self, lost: _Lost, time_us: int) -> tuple[LevelVector, float]:
-        """Mean and variance per axis of the place of a lost target."""
-        p = self.parameters
-        age_s = (time_us - lost.since_us) * 1e-6
-        ages = age_s / p.turn_s
-        way_s = p.turn_s * (1.0 - math.exp(-ages))
-        # of an Ornstein-Uhlenbeck velocity whose first value is known
-        spread = (p.speed_m_s * p.turn_s) ** 2 * max(
-            0.0, 2.0 * ages - 3.0 + 4.0 * math.exp(-ages) - math.exp(-2.0 * ages)
-        )
-        variance = p.lost_sigma_m**2 + (lost.sigma_m_s * way_s) ** 2 + spread
-        return (lost.place[0] + way_s * lost.velocity[0], lost.place[1] + way_s * lost.velocity[1]), variance
-
-    def _still_lost(self, lost: _Lost) -> float:
-        """Probability that a lost target has no track until now."""
-        p = self.parameters
-        age_s = max(0.0, (self._time_us - lost.since_us) * 1e-6)
-        return p.unseen + (1.0 - p.unseen) * math.exp(-age_s / p.found_s)
-
-    def _density(self, lost: _Lost, time_us: int, place: LevelVector) -> float:
-        p = self.parameters
-        mean, variance = self._walked(lost, time_us)
-        squared = ((place[0] - mean[0]) ** 2 + (place[1] - mean[1]) ** 2) / variance
-        return (1.0 - p.elsewhere) * math.exp(-0.5 * squared) / (
-            math.tau * variance
-        ) + p.elsewhere / p.area_m2
 
     def _meet(self, doubtful: frozenset[int]) -> None:
         """Tracks that come close to each other, or leave each other."""
@@ -446,8 +320,10 @@ class Designation:
                     one.looks = other.looks = None
                 one.nearest[b] = other.nearest[a] = away_m
                 doubled = max(one.beside.get(b, 0.0), other.beside.get(a, 0.0))
-                mixed = 0.5 * (1.0 - _kept(away_m / p.exchange_m) / _kept(before_m / p.exchange_m))
-                _exchange(one, other, (1.0 - doubled) * mixed)
+                mixed = 0.5 * (
+                    1.0 - unexchanged(away_m / p.exchange_m) / unexchanged(before_m / p.exchange_m)
+                )
+                exchange(one, other, (1.0 - doubled) * mixed)
 
     def _part(self, a: int, b: int, doubtful: frozenset[int]) -> None:
         """Two tracks that were beside each other are no longer: both are of targets, unless one of them has
@@ -462,7 +338,7 @@ class Designation:
                 self._claim(younger, 1.0)
             return
         left, kept = (one, other) if a in doubtful else (other, one)
-        self._give(left, kept, doubled)
+        give(left, kept, doubled)
 
     # looks
 
@@ -476,7 +352,7 @@ class Designation:
             if track.weight > _CERTAIN:
                 self._appearance.learn(track.looks)
         for entry, weight in zip(self._lost, lost, strict=True):
-            entry.weight, entry.counted = weight, self._still_lost(entry)
+            entry.weight, entry.counted = weight, entry.without_track(self._time_us, self.parameters)
 
     def _posterior(self) -> tuple[dict[int, float], list[float]]:
         """Probabilities of the tracks with their looks, and of the lost targets."""
@@ -484,7 +360,10 @@ class Designation:
             number: track.weight * (self._appearance.ratio(track.looks) if track.weight else 1.0)
             for number, track in self._living.items()
         }
-        lost = [entry.weight * self._still_lost(entry) / entry.counted for entry in self._lost]
+        lost = [
+            entry.weight * entry.without_track(self._time_us, self.parameters) / entry.counted
+            for entry in self._lost
+        ]
         total = sum(found.values()) + sum(lost)
         if not total > 0.0:
             return found, lost
@@ -501,18 +380,3 @@ class Designation:
             self.number = None
             return
         self.number, self.probability = best, posterior[best]
-
-
-def _exchange(one: _Living, other: _Living, probability: float) -> None:
-    """Two tracks have exchanged their targets with a probability."""
-    one.weight, other.weight = (
-        one.weight + probability * (other.weight - one.weight),
-        other.weight + probability * (one.weight - other.weight),
-    )
-
-
-def _kept(apart: float) -> float:
-    """1 - 2 q of an encounter down to a distance, with the probability q of an exchange: it composes as a
-    product.
-    """
-    return max(1e-9, 1.0 - math.exp(-0.5 * apart * apart)) if apart < math.inf else 1.0
