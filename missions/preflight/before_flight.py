@@ -175,7 +175,7 @@ async def _snapshot(vehicle: Vehicle) -> tuple[Snapshot, list[MissionItem]]:
         flavour=vehicle.autopilot,
         kind=vehicle.kind,
         messages=messages,
-        texts=tuple(text.text for text in vehicle.link.status_texts),
+        texts=tuple(text.text for text in vehicle.link.texts.newest),
         parameters=parameters,
         fence_items=len(fence_items),
     ), fence_items

@@ -80,7 +80,7 @@ class PointFlight:
         link = self._link
         if link.armed:
             return
-        reported = f" ({link.status_texts[-1].text!r})" if link.status_texts else ""
+        reported = f" ({link.texts.newest[-1].text!r})" if link.texts.newest else ""
         raise MissionError(
             f"the vehicle is disarmed {self._distance_m():.1f} m before the target{reported}; "
             f"{link.last_received()}"

@@ -99,7 +99,7 @@ class Readiness:
             await wait(timeout_s - reasons_s)
             return
         except VehicleTimeout:
-            known = {id(text) for text in link.status_texts}
+            known = {id(text) for text in link.texts.newest}
             self._commands.send_command(dialect.MAV_CMD_RUN_PREARM_CHECKS)
         try:
             await wait(reasons_s)
@@ -107,7 +107,7 @@ class Readiness:
             missing = self._adapter.readiness()
             why = ""
             if PREARM in missing:
-                texts = tuple(text.text for text in link.status_texts if id(text) not in known)
+                texts = tuple(text.text for text in link.texts.newest if id(text) not in known)
                 because = not_ready_because(texts, self._sensors_unhealthy)
                 why = (
                     f"; the autopilot says: {because}" if because else ", and the autopilot does not say why"

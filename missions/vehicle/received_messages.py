@@ -1,9 +1,7 @@
 """What is received from a vehicle: identity, newest values, texts, streams, and the loss of its link."""
 
 import asyncio
-from collections import deque
 from collections.abc import AsyncIterator, Callable
-from dataclasses import replace
 from typing import Final, TypeVar, cast, overload
 
 from autopilot_bridge.clock import Clock, TelemetryClock
@@ -24,7 +22,6 @@ from flightsim.foundation.geodesy import GeodeticPosition
 from missions.errors import MissionError, TakenOver, VehicleTimeout
 from missions.how_left import height_text
 from missions.kind import KIND_OF_TYPE, VehicleKind
-from missions.vehicle import px4_events
 from missions.vehicle.command_authority import CommandAuthority
 from missions.vehicle.connection import Connection, MessageStream
 from missions.vehicle.firmware import Firmware
@@ -33,16 +30,13 @@ from missions.vehicle.flight_home import FlightHome
 from missions.vehicle.link_watch import QUIET_AFTER_S, LinkWatch
 from missions.vehicle.mode_tasks import ModeTasks
 from missions.vehicle.notes import FlightNotes, LinkLoss
+from missions.vehicle.received_texts import ReceivedTexts
 from missions.vehicle.system_id_check import SystemIdCheck
-from missions.vehicle.telemetry import StatusText, StatusTextAssembler, source_of
+from missions.vehicle.telemetry import source_of
 
 T = TypeVar("T")
 MessageT = TypeVar("MessageT", bound=MAVLinkMessage)
 
-_TEXTS_KEPT: Final = 50
-_TEXTS_SHOWN_LEAST: Final = 3
-_TEXTS_SHOWN_MOST: Final = 10
-_TOGETHER_US: Final = 10_000_000
 _HEARTBEAT: Final = definition("HEARTBEAT").message_id
 _read_heartbeat: Final = field_reader("HEARTBEAT", "custom_mode", "type", "autopilot", "base_mode")
 _read_position: Final = field_reader("GLOBAL_POSITION_INT", "lat", "lon", "alt")
@@ -70,7 +64,7 @@ class ReceivedMessages:
     Attributes:
         connection: the connection that was given.
         notes: the mission's record of its phases, its progress and its commands, for the run's summary.
-        status_texts: the newest texts from the autopilot, oldest first.
+        texts: those of the autopilot.
         first_heartbeat_us: vehicle time of the first heartbeat that was received when vehicle time was known.
         contradiction: why what is received can't come from one vehicle; "": nothing was found.
         on_regained: called when a link that counted as lost is back.
@@ -79,7 +73,7 @@ class ReceivedMessages:
     def __init__(self, connection: Connection, system_id: int | None = None) -> None:
         self.connection = connection
         self.notes = FlightNotes()
-        self.status_texts: deque[StatusText] = deque(maxlen=_TEXTS_KEPT)
+        self.texts = ReceivedTexts()
         self._system_id = system_id
         self._firmware: Firmware | None = None
         self._authority: CommandAuthority | None = None
@@ -91,7 +85,6 @@ class ReceivedMessages:
         self._usable: dict[type, tuple[Frame, object, int]] = {}
         self.first_heartbeat_us = 0
         self._timed = False  # whether that time was a time of the vehicle
-        self._assembler = StatusTextAssembler()
         self._check: SystemIdCheck | None = None
         self._flight_home = FlightHome()
         self.contradiction = ""
@@ -318,24 +311,16 @@ class ReceivedMessages:
 
     def _on_status_text(self, frame: Frame) -> None:
         if frame.system_id == self._system_id and frame.component_id == AUTOPILOT_COMPONENT:
-            text = self._assembler.add(decode_as(frame, dialect.MAVLink_statustext_message))
-            if text is not None:
-                self._add_text(text)
-                if self._authority is not None:  # not events: most are checks for modes that changed with it
-                    self.tasks.on_text(text.text)
-                    self._authority.on_text(text.severity, text.text, self.clock.time_us)
+            message = decode_as(frame, dialect.MAVLink_statustext_message)
+            text = self.texts.add(message, self.clock.time_us)
+            if text is not None and self._authority is not None:
+                # not events: most are checks for modes that changed with it
+                self.tasks.on_text(text.text)
+                self._authority.on_text(text.severity, text.text, self.clock.time_us)
 
     def _on_event(self, frame: Frame) -> None:
-        """Add the reason that PX4 names by an event without a text."""
         if frame.system_id == self._system_id and frame.component_id == AUTOPILOT_COMPONENT:
-            event = decode_as(frame, dialect.MAVLink_event_message)
-            found = px4_events.reason(event.id, event.log_levels)
-            if found is not None:
-                severity, words = found
-                self._add_text(StatusText(severity=severity, text=words))
-
-    def _add_text(self, text: StatusText) -> None:
-        self.status_texts.append(replace(text, received_us=self.clock.time_us))
+            self.texts.add_event(decode_as(frame, dialect.MAVLink_event_message), self.clock.time_us)
 
     def _on_ack(self, frame: Frame) -> None:
         if frame.system_id == self._system_id:
@@ -514,7 +499,7 @@ class ReceivedMessages:
         if self.notes.link_losses and self.notes.link_losses[-1].end_us is not None:
             loss = self.notes.link_losses[-1]
             parts.append(f"the link had been lost for {((loss.end_us or 0) - loss.start_us) * 1e-6:.0f} s")
-        texts = self._recent_texts()
+        texts = self.texts.recent()
         if texts:
             parts.append("texts " + " / ".join(map(repr, texts)))
         return ", ".join(parts)
@@ -525,18 +510,6 @@ class ReceivedMessages:
         """
         older_s = 0.0 if self.heartbeat_us is None else (self.heartbeat_us - time_us) * 1e-6
         return older_s if older_s > QUIET_AFTER_S else 0.0
-
-    def _recent_texts(self) -> list[str]:
-        """The texts that were received shortly before the newest, without repetitions, oldest first; at least
-        the last three. A refusal's own reason is among them, also where the autopilot goes on to send others.
-        """
-        if not self.status_texts:
-            return []
-        since_us = self.status_texts[-1].received_us - _TOGETHER_US
-        recent = [t.text for t in self.status_texts if t.received_us >= since_us]
-        last = [t.text for t in list(self.status_texts)[-_TEXTS_SHOWN_LEAST:]]
-        newest = list(dict.fromkeys(reversed(recent if len(recent) > len(last) else last)))
-        return newest[_TEXTS_SHOWN_MOST - 1 :: -1]
 
 
 def describe_ack(ack: dialect.MAVLink_command_ack_message) -> str:

@@ -171,7 +171,7 @@ def test_follows_setpoints_from_home_whatever_the_local_origin(flown, flavour):
         gaps = [b - a for a, b in itertools.pairwise(times)]
         assert max(gaps) <= 60_000
         assert sum(gaps) / len(gaps) == pytest.approx(40_000, rel=0.02)
-        assert not any("Failsafe" in text.text for text in vehicle.link.status_texts)
+        assert not any("Failsafe" in text.text for text in vehicle.link.texts.newest)
         assert autopilot.setpoints[-1][1].type_mask == 0x800
 
     flown(script, flavour)
@@ -444,7 +444,7 @@ def test_long_status_texts_are_joined(flown):
             chunk = text[k : k + 50].encode()
             autopilot.send(dialect.MAVLink_statustext_message(3, chunk, 7, k // 50))
         await asyncio.sleep(0.1)
-        assert vehicle.link.status_texts[-1].text == text
+        assert vehicle.link.texts.newest[-1].text == text
 
     flown(script)
 

@@ -157,7 +157,7 @@ def _awaited(vehicles: Sequence[Vehicle]) -> str:
     for vehicle in vehicles:
         awaited = vehicle.link.awaited
         if awaited:
-            texts = vehicle.link.status_texts
+            texts = vehicle.link.texts.newest
             received = f"; received: {texts[-1].text!r}" if texts and not vehicle.armed else ""
             return f"  waiting for {awaited}{received}"
     return ""

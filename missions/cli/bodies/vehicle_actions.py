@@ -96,7 +96,7 @@ def watch(**given: Any) -> int:
 
 
 async def _watch(vehicle: Vehicle, *, as_json: bool) -> None:
-    line, shown, texts = StatusLine(), 0.0, vehicle.link.status_texts
+    line, shown, texts = StatusLine(), 0.0, vehicle.link.texts.newest
     await state(vehicle)  # requests what is not streamed
     known: set[int] = set()
     try:
