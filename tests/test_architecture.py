@@ -98,10 +98,10 @@ def module_name(path, root=ROOT):
 def imported(source, name, is_package=False):
     """Full names of everything a module imports, anywhere in it; type-checking imports count as well."""
     found = set()
-    for node in ast.walk(parsed(source)):
+    for node in nodes(source, ast.Import, ast.ImportFrom):
         if isinstance(node, ast.Import):
             found.update(alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
+        else:
             base = node.module or ""
             if node.level:
                 parts = name.split(".")
@@ -118,11 +118,19 @@ def found_by_module(find, within=PACKAGES, without=()):
     return {name: wrong for name, wrong in found.items() if wrong}
 
 
+@cache
 def source_of(name):
     return MODULES[name].read_text(encoding="utf-8")
 
 
-parsed = cache(ast.parse)
+@cache
+def nodes(source, *kinds):
+    """The nodes of some kinds in a source, in the order of `ast.walk`."""
+    if not kinds:
+        return list(ast.walk(ast.parse(source)))
+    return [node for node in nodes(source) if isinstance(node, kinds)]
+
+
 MODULES = {module_name(path): path for package in PACKAGES for path in sorted((ROOT / package).rglob("*.py"))}
 
 
@@ -197,8 +205,7 @@ def flavour_tests(source):
     """Comparisons with the name of a firmware."""
     return [
         ast.unparse(node)
-        for node in ast.walk(parsed(source))
-        if isinstance(node, ast.Compare | ast.match_case)
+        for node in nodes(source, ast.Compare, ast.match_case)
         for part in ast.walk(node.pattern if isinstance(node, ast.match_case) else node)
         if isinstance(part, ast.Constant) and part.value in ("px4", "ardupilot")
     ]
@@ -219,10 +226,10 @@ def test_only_the_emulated_backend_reaches_into_the_emulated_autopilot():
     """Another backend has none; what all have is in `AutopilotBackend` and the protocols beside it."""
     users = {
         name
-        for name, path in MODULES.items()
+        for name in MODULES
         if is_in(name, ("autopilot_bridge.sitl", "autopilot_bridge.video", "missions", "estimators"))
-        for node in ast.walk(parsed(path.read_text(encoding="utf-8")))
-        if isinstance(node, ast.Attribute) and node.attr == "commander"
+        for node in nodes(source_of(name), ast.Attribute)
+        if node.attr == "commander"
     }
     # the warm-up flies an emulated vehicle to compile what it uses
     assert users == {"autopilot_bridge.sitl.backend", "autopilot_bridge.sitl.warm_up"}
@@ -255,13 +262,14 @@ def test_kernels_have_the_cache_that_notices_other_modules():
     assert users == ["flightsim.foundation.kernels"]
 
 
+@cache
 def needed(name):
     """The modules of ours that a module imports; `from package import module` needs only the module."""
     found = set()
-    for node in ast.walk(parsed(source_of(name))):
+    for node in nodes(source_of(name), ast.Import, ast.ImportFrom):
         if isinstance(node, ast.Import):
             found.update(alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
+        else:
             for alias in node.names:
                 module = f"{node.module}.{alias.name}"
                 found.add(module if module in MODULES else node.module)
@@ -291,12 +299,10 @@ def test_the_test_sees_circles():
 
 def lazy_imports(source):
     """Lines of imports inside functions."""
-    functions = (ast.FunctionDef, ast.AsyncFunctionDef)
     return sorted(
         {
             node.lineno
-            for function in ast.walk(parsed(source))
-            if isinstance(function, functions)
+            for function in nodes(source, ast.FunctionDef, ast.AsyncFunctionDef)
             for node in ast.walk(function)
             if isinstance(node, ast.Import | ast.ImportFrom)
         }
@@ -319,11 +325,8 @@ def sendings(source):
     """Lines that send over the connection of a vehicle: `link.connection.send(...)`."""
     return [
         node.lineno
-        for node in ast.walk(parsed(source))
-        if isinstance(node, ast.Attribute)
-        and node.attr == "send"
-        and isinstance(node.value, ast.Attribute)
-        and node.value.attr == "connection"
+        for node in nodes(source, ast.Attribute)
+        if node.attr == "send" and isinstance(node.value, ast.Attribute) and node.value.attr == "connection"
     ]
 
 
@@ -391,12 +394,11 @@ FLAG = re.compile(r"(?<![\w-])--[a-z]")
 
 def texts(source):
     """The string literals of a module, without docstrings."""
-    tree = parsed(source)
-    documentation = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+    documentation = {id(node.value) for node in nodes(source, ast.Expr)}
     return [
         node.value
-        for node in ast.walk(tree)
-        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in documentation
+        for node in nodes(source, ast.Constant)
+        if isinstance(node.value, str) and id(node) not in documentation
     ]
 
 
@@ -421,17 +423,18 @@ WRAPS = ("wrap_180", "longitude_near")
 
 def longitude_differences(source):
     """Subtractions of longitudes that are not the argument of a function that wraps."""
-    tree = parsed(source)
+    if not LONGITUDE.search(source):
+        return []
     wrapped = {
         id(argument)
-        for node in ast.walk(tree)
-        if isinstance(node, ast.Call) and ast.unparse(node.func).rpartition(".")[2] in WRAPS
+        for node in nodes(source, ast.Call)
+        if ast.unparse(node.func).rpartition(".")[2] in WRAPS
         for argument in node.args
     }
     return [
         ast.unparse(node)
-        for node in ast.walk(tree)
-        if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Sub) and id(node) not in wrapped
+        for node in nodes(source, ast.BinOp)
+        if isinstance(node.op, ast.Sub) and id(node) not in wrapped
         if LONGITUDE.search(ast.unparse(node.right))
     ]
 
@@ -455,8 +458,8 @@ def degrees_on_the_wire(source):
     """Products and quotients with 1e7 or 1e-7, by which degrees and degE7 are made of each other."""
     return [
         ast.unparse(node)
-        for node in ast.walk(parsed(source))
-        if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mult | ast.Div)
+        for node in nodes(source, ast.BinOp)
+        if isinstance(node.op, ast.Mult | ast.Div)
         for factor in (node.left, node.right)
         if isinstance(factor, ast.Constant) and factor.value in (1e7, 1e-7)
     ]
@@ -488,8 +491,8 @@ def earth_constants(source):
     return sorted(
         {
             node.value
-            for node in ast.walk(parsed(source))
-            if isinstance(node, ast.Constant) and isinstance(node.value, int | float)
+            for node in nodes(source, ast.Constant)
+            if isinstance(node.value, int | float)
             for constant in EARTH_CONSTANTS
             if abs(node.value - constant) < 1e-5 * constant
         }
@@ -497,7 +500,7 @@ def earth_constants(source):
 
 
 def test_the_foundation_alone_defines_the_earth_and_the_atmosphere():
-    found = {name: earth_constants(path.read_text(encoding="utf-8")) for name, path in MODULES.items()}
+    found = {name: earth_constants(source_of(name)) for name in MODULES}
     assert {name for name, values in found.items() if values} == {
         "flightsim.foundation.atmosphere",
         "flightsim.foundation.geodesy",
@@ -507,9 +510,7 @@ def test_the_foundation_alone_defines_the_earth_and_the_atmosphere():
 def bare_places(source):
     """Numbers and number ranges that index an array with a layout of its own."""
     found = []
-    for node in ast.walk(parsed(source)):
-        if not isinstance(node, ast.Subscript):
-            continue
+    for node in nodes(source, ast.Subscript):
         array = node.value.attr if isinstance(node.value, ast.Attribute) else getattr(node.value, "id", "")
         parts = [node.slice.lower, node.slice.upper] if isinstance(node.slice, ast.Slice) else [node.slice]
         if array in LAID_OUT and any(isinstance(part, ast.Constant) for part in parts):
@@ -531,9 +532,9 @@ def test_one_module_wraps_angles_and_one_multiplies_quaternions():
     """A function defined elsewhere under one of these names is a copy."""
     defined = {
         (node.name, name)
-        for name, path in MODULES.items()
-        for node in ast.walk(parsed(path.read_text(encoding="utf-8")))
-        if isinstance(node, ast.FunctionDef) and node.name.strip("_") in ANGLE_FUNCTIONS
+        for name in MODULES
+        for node in nodes(source_of(name), ast.FunctionDef)
+        if node.name.strip("_") in ANGLE_FUNCTIONS
     }
     assert {module.rpartition(".")[0] for _, module in defined} == {"flightsim.foundation"}
 
