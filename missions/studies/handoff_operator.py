@@ -88,11 +88,13 @@ class Person:
     Attributes:
         asked: number of requests so far.
         waiting: there is a request without an answer.
+        mistaken: the last answer named another person than the target; the study reports it.
     """
 
     def __init__(self, parameters: PersonParameters, rng: np.random.Generator) -> None:
         self.parameters = parameters
         self.asked = 0
+        self.mistaken = False
         self._rng = rng
         self._from_us: int | None = None
 
@@ -138,6 +140,7 @@ class Person:
             return None
         self._from_us = None
         taken = self._taken(wanted, others, away)
+        self.mistaken = taken is not wanted
         if marked is not None:
             off_px = [(math.dist(marked, (t.x_px, t.y_px)), t is taken) for t in seen]
             nearest_px, is_it = min(off_px)

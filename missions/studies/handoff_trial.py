@@ -308,7 +308,8 @@ def outcome_of(flight: TrialFlight, comparison: TrackComparison, early: Early | 
         true = world.seen_from(HandoffWorld.TRACKER, world.targets[:1])[0]
         tracker_error_m = math.dist(true, report.target)
         if flight.target_of(HandoffWorld.TRACKER, report.number) != 0:
-            cause = "tracker on another target"
+            mistaken = flight.tracker.person.mistaken
+            cause = "operator pointed at another target" if mistaken else "tracker on another target"
     if number is not None:
         score = comparison.scores.get(number)
         target = flight.target_of(HandoffWorld.HANDOFF, number)

@@ -142,6 +142,15 @@ def test_a_person_says_yes_to_the_mark_on_the_target_and_points_elsewhere_otherw
     assert all(answer.point is None and not answer.yes for answer in none) and min(times_s) >= 18.0
 
 
+def test_the_study_learns_of_an_answer_that_names_another_person():
+    for lapse in (0.0, 1.0):
+        person = Person(PersonParameters(lapse=lapse, click_px=0.01), np.random.default_rng(1))
+        assert person.ask(0)
+        answer = person.look(20_000_000, (seen(0.0, wanted=True), seen(120.0)), None)
+        assert answer is not None and person.mistaken == (lapse == 1.0)
+        assert answer.point is not None and (abs(answer.point[0] - 120.0) < 1.0) == person.mistaken
+
+
 def test_requests_are_limited_and_counted():
     person = Person(PersonParameters(requests=2), np.random.default_rng(1))
     assert person.ask(0) and person.ask(1) and not person.ask(2)
