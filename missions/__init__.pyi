@@ -30,7 +30,10 @@ from missions.pattern_search.tag_target import TagTarget as TagTarget
 from missions.pattern_search.world import tag_search_world as tag_search_world
 from missions.plan_files.options import FileOptions as FileOptions
 from missions.plan_files.options import Then as Then
+from missions.runs.run import Run as Run
+from missions.runs.run import open_run as open_run
 from missions.runs.session import RunResult as RunResult
+from missions.runs.session import afly as afly
 from missions.runs.session import fly as fly
 from missions.search.options import StepLawKind as StepLawKind
 from missions.search.options import StepSearchOptions as StepSearchOptions

@@ -22,7 +22,9 @@ MISSION, ESTIMATOR, AIRCRAFT, ANALYSIS = (
 )
 
 
-@pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.*")), ids=lambda path: path.name)
+@pytest.mark.parametrize(
+    "path", sorted({*EXAMPLES.glob("*.py"), *EXAMPLES.glob("*.toml")}), ids=lambda path: path.name
+)
 def test_each_shows_its_command(path: Path) -> None:
     commands = commands_in(path.read_text(encoding="utf-8"))
     assert commands
@@ -119,3 +121,23 @@ def test_a_sweep_in_a_small_form(tmp_path: Path) -> None:
     sweep["draw"](rows, tmp_path / "sweep.png")
     assert (tmp_path / "sweep.png").stat().st_size > 5_000
     assert (tmp_path / "wind-9-seed-1" / "flight.tlog").exists()
+
+
+@pytest.mark.slow
+def test_the_notebook_runs(tmp_path: Path) -> None:
+    nbformat, nbclient = pytest.importorskip("nbformat"), pytest.importorskip("nbclient")
+    notebook = nbformat.read(EXAMPLES / "flight.ipynb", as_version=4)
+    nbclient.NotebookClient(
+        notebook, timeout=300, kernel_name="python3", resources={"metadata": {"path": str(tmp_path)}}
+    ).execute()
+    outputs = [cell["outputs"] for cell in notebook.cells if cell["cell_type"] == "code"]
+    assert "<td>completed</td>" in outputs[0][-1]["data"]["text/html"]
+    assert re.search(r"roll: 0\.\d\d deg RMS off the truth", outputs[3][0]["text"])
+    assert re.fullmatch(r"\[0\.\d+, 0\.\d+\]", outputs[4][-1]["data"]["text/plain"])
+    assert "data:image/png;base64," in outputs[5][-1]["data"]["text/html"]
+    assert len(list((tmp_path / "runs").iterdir())) == 3
+
+
+def test_the_notebook_has_no_outputs() -> None:
+    cells = json.loads((EXAMPLES / "flight.ipynb").read_text(encoding="utf-8"))["cells"]
+    assert [cell for cell in cells if cell.get("outputs")] == []

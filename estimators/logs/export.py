@@ -8,6 +8,7 @@ from typing import Any, Final
 import numpy as np
 
 from estimators.errors import LogError
+from estimators.logs.arrow import ExportedColumn, arrow_table, exported_columns, name_in_si
 from estimators.logs.iterate import Selection, messages_in_order
 from estimators.logs.log import Log
 from estimators.logs.new_file import new_file
@@ -18,8 +19,6 @@ from estimators.user_choices import ExportFormat
 
 FORMATS: Final = tuple(map(str, ExportFormat))
 """csv, parquet: a folder with a file for each message and component; npz, mcap: one file."""
-
-_TIMES: Final = ("time_us", "log_time_us")
 
 
 def export(
@@ -50,19 +49,6 @@ def export(
     return writer(log, selections, path, si)
 
 
-def table_columns(table: Table, *, si: bool) -> dict[str, np.ndarray[Any, Any]]:
-    """A table's columns by name, times first; with `si`, in SI units and radians where a field has a unit."""
-    columns: dict[str, np.ndarray[Any, Any]] = {"time_us": table.time_us, "log_time_us": table.log_time_us}
-    for field in table.fields:
-        # a field with the name of a time column is renamed
-        name = field if field not in columns else f"{field}_"
-        column = table[field]
-        columns[name] = (
-            table.si(field) if si and column.dtype.kind != "S" and field in table.units else column
-        )
-    return columns
-
-
 def _name(table: Table) -> str:
     return f"{table.name}_{table.system_id}_{table.component_id}"
 
@@ -71,42 +57,21 @@ def _tables(log: Log, selections: Sequence[Selection]) -> list[Table]:
     return [log.stream_table(stream).select(rows) for stream, rows in selections]
 
 
-def _units(table: Table, si: bool) -> Mapping[str, str]:
-    return {field: table.si_unit(field) if si else unit for field, unit in table.units.items()}
-
-
-def _arrow(table: Table, si: bool) -> Any:
-    import pyarrow as pa
-
-    units = _units(table, si)
-    arrays, fields = [], []
-    for name, column in table_columns(table, si=si).items():
-        unit = "us" if name in _TIMES else units.get(name, "")
-        if column.dtype.kind == "S":
-            array = pa.array([item.decode("ascii", "replace") for item in column.tolist()], type=pa.string())
-        elif column.ndim == 2:
-            values = pa.array(np.ascontiguousarray(column).reshape(-1))
-            array = pa.FixedSizeListArray.from_arrays(values, column.shape[1])
-        else:
-            array = pa.array(np.ascontiguousarray(column))
-        arrays.append(array)
-        fields.append(pa.field(name, array.type, metadata={"unit": unit} if unit else None))
-    about = {
-        "message": table.name,
-        "system_id": str(table.system_id),
-        "component_id": str(table.component_id),
-    }
-    return pa.Table.from_arrays(arrays, schema=pa.schema(fields, metadata=about))
-
-
-def _flat(columns: Mapping[str, np.ndarray[Any, Any]]) -> dict[str, np.ndarray[Any, Any]]:
-    """Arrays as one column per element, for CSV: controls_0, controls_1, ..."""
-    flat: dict[str, np.ndarray[Any, Any]] = {}
+def _csv_columns(columns: Mapping[str, ExportedColumn]) -> dict[str, Any]:
+    """Columns under headings with their units ("vx [cm/s]", where the name does not have it), arrays as one
+    column per element: controls_0, controls_1, ...
+    """
+    flat: dict[str, Any] = {}
     for name, column in columns.items():
-        if column.ndim == 2:
-            flat |= {f"{name}_{index}": column[:, index] for index in range(column.shape[1])}
+        said = not column.unit or name.endswith(f"_{column.unit}")
+        unit = "" if said else f" [{column.unit}]"
+        values = column.values
+        if values.dtype.kind == "S":
+            flat[f"{name}{unit}"] = [item.decode("ascii", "replace") for item in values.tolist()]
+        elif values.ndim == 2:
+            flat |= {f"{name}_{index}{unit}": values[:, index] for index in range(values.shape[1])}
         else:
-            flat[name] = column
+            flat[f"{name}{unit}"] = np.ascontiguousarray(values)
     return flat
 
 
@@ -128,7 +93,7 @@ def _parquet(log: Log, selections: Sequence[Selection], path: Path, si: bool) ->
     for table in _tables(log, selections):
         file = path / f"{_name(table)}.parquet"
         with new_file(file) as part:
-            parquet.write_table(_arrow(table, si), part)
+            parquet.write_table(arrow_table(table, si=si), part)
         written.append(file)
     return written
 
@@ -140,24 +105,18 @@ def _csv(log: Log, selections: Sequence[Selection], path: Path, si: bool) -> lis
     _new_folder(path)
     written = []
     for table in _tables(log, selections):
-        columns = {
-            name: [item.decode("ascii", "replace") for item in column.tolist()]
-            if column.dtype.kind == "S"
-            else np.ascontiguousarray(column)
-            for name, column in _flat(table_columns(table, si=si)).items()
-        }
         file = path / f"{_name(table)}.csv"
         with new_file(file) as part:
-            csv.write_csv(pa.table(columns), part)
+            csv.write_csv(pa.table(_csv_columns(exported_columns(table, si=si))), part)
         written.append(file)
     return written
 
 
 def _npz(log: Log, selections: Sequence[Selection], path: Path, si: bool) -> list[Path]:
     arrays: dict[str, Any] = {
-        f"{_name(table)}/{name}": column
+        f"{_name(table)}/{name}": column.values
         for table in _tables(log, selections)
-        for name, column in table_columns(table, si=si).items()
+        for name, column in exported_columns(table, si=si).items()
     }
     with new_file(path) as part, open(part, "wb") as file:
         np.savez_compressed(file, **arrays)
@@ -171,18 +130,18 @@ def _mcap(log: Log, selections: Sequence[Selection], path: Path, si: bool) -> li
         writer = Writer(file)
         writer.start(profile="", library="flightstack")
         channels = {}
-        factors: dict[tuple[str, int, int], dict[str, float]] = {}
+        in_si: dict[tuple[str, int, int], dict[str, tuple[str, float]]] = {}
         for stream, _ in selections:
             units = stream.description.units
             converted = {field: to_si(unit) for field, unit in units.items()} if si else {}
-            factors[stream.name, stream.system_id, stream.component_id] = {
-                field: factor for field, (factor, _) in converted.items()
+            in_si[stream.name, stream.system_id, stream.component_id] = names = {
+                field: (name_in_si(field, units[field]), factor) for field, (factor, _) in converted.items()
             }
             schema = {
                 "title": stream.name,
                 "type": "object",
                 "properties": {
-                    field.name: _json_type(
+                    names.get(field.name, (field.name, 1.0))[0]: _json_type(
                         field.code,
                         field.length,
                         converted[field.name][1] if field.name in converted else units.get(field.name, ""),
@@ -211,7 +170,8 @@ def _mcap(log: Log, selections: Sequence[Selection], path: Path, si: bool) -> li
                 for name, value in zip(message._fields, message, strict=True)
                 if name not in SOURCE_FIELDS
             }
-            fields |= {name: _scaled(fields[name], factor) for name, factor in factors[key].items()}
+            for name, (name_of_si, factor) in in_si[key].items():
+                fields[name_of_si] = _scaled(fields.pop(name), factor)
             writer.add_message(
                 channel_id=channels[key],
                 log_time=_nanoseconds(log_time_us or time_us),

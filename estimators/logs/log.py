@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimators.errors import LogError, NothingThere
+from estimators.html_table import html_table
 from estimators.logs.iterate import Selection, messages_in_order
 from estimators.logs.log_clock import LogClock, make_clock
 from estimators.logs.source import LogSource, Positions, Stream
@@ -147,6 +148,12 @@ class Log:
                         )
                     )
         return tuple(found)
+
+    def _repr_html_(self) -> str:
+        """The log as a table of its messages, for notebooks."""
+        title = f"{self.path.name}: {self.format}, {self.duration_s:.1f} s, {len(self)} messages"
+        rows = [(key.name, f"{key.system_id}/{key.component_id}", key.count) for key in self.keys]
+        return html_table(title, rows, ("message", "sender", "number"))
 
     @cached_property
     def clock(self) -> LogClock:

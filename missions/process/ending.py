@@ -6,16 +6,22 @@ leaves its vehicles safe before it ends.
 """
 
 import asyncio
+import contextvars
 import signal
 import threading
 from abc import ABC, abstractmethod
-from collections.abc import Coroutine
+from collections.abc import Callable, Coroutine
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from functools import partial
 from types import FrameType, TracebackType
-from typing import Any, ClassVar, Final, Self
+from typing import Any, ClassVar, Final, Self, TypeVar
 
 from autopilot_bridge.clock import run
 from autopilot_bridge.clock.pacing import wall_time_s
 from missions.process.supervision import END_SIGNALS
+
+T = TypeVar("T")
 
 _SAME_S: Final = 1.0
 """A closed terminal and its shell both send SIGHUP, and `timeout` sends SIGTERM twice: within this time they
@@ -85,7 +91,8 @@ class EndingSignals(EndSignalHandler):
     """A context in which Ctrl-C, SIGTERM and SIGHUP interrupt in the same way.
 
     During `run`, the first signal cancels the coroutine, and a later one stops it immediately; outside `run`,
-    the first one stops immediately. See `end_signals` for the signals that are not handled.
+    the first one stops immediately. See `end_signals` for the signals that are not handled. Work that another
+    thread does (`in_thread`) is interrupted in the same way, except that it ends by itself outside `run`.
     """
 
     def __init__(self) -> None:
@@ -93,6 +100,8 @@ class EndingSignals(EndSignalHandler):
         self._task: asyncio.Task[Any] | None = None
         self._number: int | None = None
         self._first_wall_s = 0.0
+        self._elsewhere = False
+        self._late = False  # what was to be interrupted had ended
 
     def run(self, main: Coroutine[Any, Any, None], loop: asyncio.AbstractEventLoop) -> None:
         """Run a coroutine on a loop as `autopilot_bridge.clock.run` does.
@@ -107,21 +116,79 @@ class EndingSignals(EndSignalHandler):
                 raise
             raise EndedBySignal(self._number) from None
 
+    def in_thread(self, work: Callable[[], T]) -> T:
+        """Do work, which may `run`, in a thread of its own, and wait for it: for a thread that has a running
+        event loop, such as a notebook's.
+
+        Raises:
+            EndedBySignal: it was interrupted.
+        """
+        self._elsewhere = True
+        with ThreadPoolExecutor(1, thread_name_prefix="flight") as pool:
+            done = pool.submit(contextvars.copy_context().run, work).result()
+        if self._late and self._number is not None:
+            raise EndedBySignal(self._number)
+        return done
+
+    async def beside(self, work: Callable[[], T]) -> T:
+        """The same for a coroutine, whose event loop goes on. Its cancellation interrupts the work.
+
+        Raises:
+            CancelledError: it was interrupted, and has ended.
+        """
+        self._elsewhere = True
+        pool = ThreadPoolExecutor(1, thread_name_prefix="flight")
+        done = asyncio.get_running_loop().run_in_executor(pool, contextvars.copy_context().run, work)
+        pool.shutdown(wait=False)
+        cancelled: asyncio.CancelledError | None = None
+        while not done.done():
+            try:
+                await asyncio.wait([done])
+            except asyncio.CancelledError as error:
+                cancelled = error
+                self.interrupt(signal.SIGINT)
+        if cancelled is not None:
+            done.exception()  # it is the answer to the interruption
+            raise cancelled
+        return done.result()
+
     async def _interruptible(self, main: Coroutine[Any, Any, None]) -> None:
         self._task = asyncio.current_task()
+        if self._number is not None:  # by another thread, before this one came here
+            main.close()
+            raise asyncio.CancelledError
         await main
 
-    def _on_signal(self, number: int, frame: FrameType | None) -> None:
+    def interrupt(self, number: int) -> None:
+        """Interrupt as a signal does. Work in another thread is interrupted there.
+
+        Args:
+            number: the signal's number.
+
+        Raises:
+            EndedBySignal: there is nothing to cancel; only where this thread does the work.
+        """
         now_s = wall_time_s()
         task, again = self._task, self._number is not None
         if again and number != signal.SIGINT and now_s - self._first_wall_s < _SAME_S:
             return
         self._number, self._first_wall_s = self._number or number, now_s
-        if again or task is None or task.done():
+        running = task is not None and not task.done()
+        self._late = task is not None and not running
+        if not self._elsewhere and (again or not running):
             raise EndedBySignal(self._number)
-        task.cancel()
-        # wakes the loop, which may be waiting for a long time
-        task.get_loop().call_soon_threadsafe(lambda: None)
+        if task is not None and running:
+            stop = partial(_raise, EndedBySignal(self._number)) if again else task.cancel
+            with suppress(RuntimeError):  # the loop was closed meanwhile
+                # from any thread; it also wakes the loop, which may be waiting for a long time
+                task.get_loop().call_soon_threadsafe(stop)
+
+    def _on_signal(self, number: int, frame: FrameType | None) -> None:
+        self.interrupt(number)
+
+
+def _raise(error: BaseException) -> None:
+    raise error
 
 
 class EndRequests(EndSignalHandler):

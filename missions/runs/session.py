@@ -3,9 +3,9 @@
 This module opens the world or the links, starts the event loop, and reads the wall clock.
 """
 
-from collections.abc import Mapping
+import asyncio
 from dataclasses import dataclass, field, replace
-from pathlib import Path
+from functools import partial
 from typing import Any
 
 from autopilot_bridge.clock import unix_time_us
@@ -43,29 +43,22 @@ from missions.runs.results import (
     time_stamp_faults,
     title,
 )
+from missions.runs.run import Run
 from missions.runs.vehicle_opening import VehicleOpener
 
-__all__ = ["COMPLETED", "FAILED", "INTERRUPTED", "Flight", "RunRequest", "RunResult", "fly"]
+__all__ = ["COMPLETED", "FAILED", "INTERRUPTED", "Flight", "RunRequest", "RunResult", "afly", "fly"]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RunResult:
-    """The result of a run.
+@dataclass(frozen=True, kw_only=True)
+class RunResult(Run):
+    """The result of a run, and its data as of a `Run`.
 
     Attributes:
-        outcome: "completed", "failed" or "interrupted".
-        reason: why it failed; "" otherwise.
-        folder: the run folder.
-        summary: contents of `summary.json`.
         report: what the mission reports.
         signal: the signal that interrupted it; 0: none.
         left: how each vehicle that was received was left.
     """
 
-    outcome: str
-    reason: str
-    folder: Path
-    summary: Mapping[str, Any]
     report: Report = field(default_factory=Report)
     signal: int = 0
     left: tuple[HowLeft, ...] = ()
@@ -81,7 +74,8 @@ def fly(
     """Fly a mission and write its run folder. Blocks until the run is finished.
 
     A mission that fails or is interrupted (Ctrl-C; in the main thread also SIGTERM and SIGHUP) leaves its
-    vehicles safe, and still returns a result and writes a complete log.
+    vehicles safe, and still returns a result and writes a complete log. In a thread that has a running event
+    loop (a notebook) the flight has a thread of its own; coroutines use `afly`.
 
     Args:
         mission: a mission, its name, or the path of a user's own or of a mission file.
@@ -98,7 +92,43 @@ def fly(
     opener = VehicleOpener() if opener is None else opener
     flown = find_mission(mission) if isinstance(mission, str) else mission
     with EndingSignals() as ending:
-        return _fly_interruptible(flown, request or RunRequest(), on_progress, ending, opener)
+        work = partial(_fly_interruptible, flown, request or RunRequest(), on_progress, ending, opener)
+        return ending.in_thread(work) if _loop_is_running() else work()
+
+
+async def afly(
+    mission: Mission[Any] | str,
+    request: RunRequest | None = None,
+    on_progress: ProgressListener | None = None,
+    *,
+    opener: VehicleOpener | None = None,
+) -> RunResult:
+    """`fly` for coroutines: the flight has a thread of its own, and the caller's event loop goes on.
+
+    `on_progress` is called in that thread. Cancelling the coroutine interrupts the flight as Ctrl-C does, and
+    ends when the vehicles are left safe and the log is complete.
+
+    Args:
+        mission, request, on_progress, opener: as of `fly`.
+
+    Raises:
+        CancelledError: the coroutine was cancelled.
+        PlanError, MissionError, BridgeError: as of `fly`.
+    """
+    opener = VehicleOpener() if opener is None else opener
+    flown = find_mission(mission) if isinstance(mission, str) else mission
+    ending = EndingSignals()
+    work = partial(_fly_interruptible, flown, request or RunRequest(), on_progress, ending, opener)
+    return await ending.beside(work)
+
+
+def _loop_is_running() -> bool:
+    """Whether this thread runs an event loop, so that it can't run another."""
+    try:
+        asyncio.get_running_loop()
+    except RuntimeError:
+        return False
+    return True
 
 
 def _fly_interruptible(

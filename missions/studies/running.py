@@ -4,12 +4,14 @@ import sys
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from html import escape
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
 from autopilot_bridge.clock.pacing import wall_time_s
+from estimators.html_table import html_table
 from missions.errors import MissionError, PlanError
 from missions.process.ending import signal_of
 from missions.studies.engine import Engine, Progress
@@ -49,6 +51,13 @@ class StudyResult:
     outcome: str
     reason: str = ""
     signal: int = 0
+
+    def _repr_html_(self) -> str:
+        """The table of its figures, for notebooks."""
+        title = f"study {self.results.name}: {self.outcome}{': ' if self.reason else ''}{self.reason}"
+        rows = [("folder", self.folder), ("trials", self.results.table.num_rows)]
+        text = escape("\n".join(self.table))
+        return f"{html_table(title, rows)}<pre>{text}</pre>"
 
 
 def run_trial(

@@ -9,6 +9,7 @@ from pyarrow import csv, parquet
 
 from autopilot_bridge.mavlink import FrameEncoder, dialect
 from estimators.logs import LogError, open_log
+from estimators.logs.arrow import name_in_si
 from estimators.logs.export import FORMATS, export
 from estimators.logs.new_file import new_file
 from tests.estimators.logs.flight_log import RATE_HZ, SECONDS, write
@@ -46,12 +47,36 @@ def test_si_units_where_a_field_has_a_unit(log, tmp_path):
     assert gps["vel"][0].as_py() == pytest.approx(15.0)
     assert gps["fix_type"][0].as_py() == 3
     assert gps.schema.field("vel").metadata == {b"unit": b"m/s"}
+    assert gps["time_s"][0].as_py() == pytest.approx(log.table("GPS_RAW_INT")["time_usec"][0] * 1e-6)
+    assert "time_usec" not in gps.column_names
+
+
+@pytest.mark.parametrize(
+    ("field", "unit", "name"),
+    [
+        ("time_boot_ms", "ms", "time_boot_s"),
+        ("time_usec", "us", "time_s"),
+        ("usec", "us", "s"),
+        ("lat", "degE7", "lat"),
+        ("rpm", "rpm", "rad_s"),
+        ("terms", "", "terms"),
+    ],
+)
+def test_names_in_si_have_the_unit_of_their_values(field, unit, name):
+    assert name_in_si(field, unit) == name
+
+
+def test_csv_in_si_has_units_in_its_headings(log, tmp_path):
+    export(log, log.select(["GPS_RAW_INT", "SERVO_OUTPUT_RAW"]), tmp_path / "out", "csv", si=True)
+    gps = csv.read_csv(tmp_path / "out" / "GPS_RAW_INT_1_1.csv")
+    assert {"time_us", "time_s", "lat [rad]", "vel [m/s]", "fix_type"} <= set(gps.column_names)
 
 
 def test_csv(log, tmp_path):
     export(log, log.select(["RAW_IMU", "STATUSTEXT"]), tmp_path / "out", "csv")
     imu = csv.read_csv(tmp_path / "out" / "RAW_IMU_1_1.csv")
-    assert imu.num_rows == COUNT and imu["zacc"].to_pylist() == [-1000] * COUNT
+    assert imu.num_rows == COUNT and imu["zacc [mG]"].to_pylist() == [-1000] * COUNT
+    assert imu.column_names[:3] == ["time_us", "log_time_us", "time_usec [us]"]
     assert csv.read_csv(tmp_path / "out" / "STATUSTEXT_1_1.csv")["text"][9].as_py() == "second 9"
 
 
@@ -94,7 +119,8 @@ def test_mcap_in_si_units(log, tmp_path):
         rows = [row for schema, row in found if schema.name == f"mavlink_si.{name}"]
         for field in table.fields:
             expected = table.si(field) if field in table.units else table[field]
-            assert [row[field] for row in rows] == expected.tolist(), field
+            called = name_in_si(field, table.units.get(field, ""))
+            assert [row[called] for row in rows] == expected.tolist(), field
     schema = next(json.loads(item.data) for item, _ in found if item.name == "mavlink_si.GPS_RAW_INT")
     assert schema["properties"]["lat"] == {"type": "number", "description": "rad"}
     assert schema["properties"]["fix_type"] == {"type": "integer"}
