@@ -4,7 +4,7 @@ Source: MAVLink mission protocol, https://mavlink.io/en/services/mission.html.
 """
 
 import math
-from typing import Final
+from typing import Final, Protocol
 
 from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem
@@ -26,6 +26,25 @@ _DEG_E7: Final = 1e7
 _LOCAL_E4: Final = 1e4
 
 
+class HasItem(Protocol):
+    """MISSION_ITEM_INT or MISSION_ITEM, of pymavlink or of `estimators.wire`."""
+
+    command: int
+    frame: int
+    param1: float
+    param2: float
+    param3: float
+    param4: float
+    z: float
+    autocontinue: int
+
+    @property
+    def x(self) -> float: ...
+
+    @property
+    def y(self) -> float: ...
+
+
 def is_geodetic(item: MissionItem) -> bool:
     """True when x and y of an item are latitude and longitude."""
     return item.frame in GEODETIC_FRAMES
@@ -35,13 +54,23 @@ def item_from_message(
     message: dialect.MAVLink_mission_item_message | dialect.MAVLink_mission_item_int_message,
 ) -> MissionItem:
     """The item in a MISSION_ITEM or MISSION_ITEM_INT, unchecked; unset coordinates become NaN."""
+    if isinstance(message, dialect.MAVLink_mission_item_int_message):
+        return item_from_int(message)
+    return _item(message, message.x, message.y)
+
+
+def item_from_int(message: HasItem) -> MissionItem:
+    """The item in a MISSION_ITEM_INT, unchecked; unset coordinates become NaN."""
     x: float = message.x
     y: float = message.y
-    if isinstance(message, dialect.MAVLink_mission_item_int_message):
-        if message.frame in GEODETIC_FRAMES:
-            x, y = (math.nan if value == UNSET_INT else value / _DEG_E7 for value in (x, y))
-        elif message.frame != dialect.MAV_FRAME_MISSION:
-            x, y = x / _LOCAL_E4, y / _LOCAL_E4
+    if message.frame in GEODETIC_FRAMES:
+        x, y = (math.nan if value == UNSET_INT else value / _DEG_E7 for value in (x, y))
+    elif message.frame != dialect.MAV_FRAME_MISSION:
+        x, y = x / _LOCAL_E4, y / _LOCAL_E4
+    return _item(message, x, y)
+
+
+def _item(message: HasItem, x: float, y: float) -> MissionItem:
     return MissionItem(
         command=message.command,
         frame=message.frame,

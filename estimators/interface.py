@@ -13,6 +13,7 @@ from typing import Any, ClassVar, Generic, Protocol, TypeVar
 from autopilot_bridge.mavlink import MAVLinkMessage
 from estimators.messages import Message
 from estimators.observations import Observation
+from estimators.scene_items import Item
 from flightsim.foundation.geodesy import GeodeticPosition
 
 P = TypeVar("P")
@@ -187,6 +188,14 @@ class Estimator(ABC, Generic[P]):
     def publish(self) -> Sequence[MAVLinkMessage]:
         """Messages with the newest estimates, to be sent from the estimator's own component id."""
         return ()
+
+    def shown(self) -> Mapping[str, Item]:
+        """What a viewer shows of the estimator's belief now, by name: "particles", "grid/probability".
+
+        What the estimates say is shown without it, by the names of their columns. It is read once a second of
+        vehicle time, and changes nothing. Positions are from `origin`.
+        """
+        return {}
 
     def files(self) -> Mapping[str, bytes]:
         """Further files of the run, made at its end: contents by name."""

@@ -5,29 +5,22 @@ vehicle); its other fields are numbers, strings, tuples of numbers, or arrays. T
 `flight.observations` beside `flight.tlog`. Each record has the number of frames that the log had before it,
 so that a replay passes messages and observations to an estimator in the order of the flight.
 
-The file is a sequence of records: the magic bytes, lengths of header and body (uint32), CRC-32 of both, the
-    header
-(JSON: kind, frames, fields; arrays as type, shape and place in the body), and the body, compressed by zlib. A
-record that is damaged or incomplete ends the file.
+The file is one of `estimators.dataclass_records`.
 """
 
-import json
-import struct
-import zlib
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO, Final, Protocol
+from typing import Any, Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from estimators.dataclass_records import RecordWriter, read_records
 from flightsim.foundation.vectors import Quaternion, Vector
 
 SUFFIX: Final = ".observations"
 _MAGIC: Final = b"FSO1"
-_MAX_BODY: Final = 1 << 30
-_HEAD: Final = struct.Struct("<4sIII")
 
 
 class Observation(Protocol):
@@ -73,8 +66,7 @@ class ObservationWriter:
     """
 
     def __init__(self, path: Path) -> None:
-        self._path = path
-        self._file: BinaryIO | None = None
+        self._records = RecordWriter(path, _MAGIC)
 
     def write(self, observation: Observation, frames: int) -> None:
         """Append an observation that was received after this number of frames of the log.
@@ -82,27 +74,11 @@ class ObservationWriter:
         Raises:
             OSError: the file exists, or can't be written.
         """
-        if self._file is None:
-            self._file = self._path.open("xb")
-        header: dict[str, Any] = {"kind": type(observation).__name__, "frames": frames}
-        arrays, start = [], 0
-        for field in fields(observation):  # type: ignore[arg-type]  # observations are dataclasses
-            value = getattr(observation, field.name)
-            if isinstance(value, np.ndarray):
-                raw = np.ascontiguousarray(value).tobytes()
-                arrays.append(raw)
-                value = {"dtype": value.dtype.str, "shape": value.shape, "start": start}
-                start += len(raw)
-            header[f".{field.name}"] = value
-        head = json.dumps(header).encode()
-        body = zlib.compress(b"".join(arrays), 1)
-        self._file.write(_HEAD.pack(_MAGIC, len(head), len(body), zlib.crc32(head + body)) + head + body)
-        self._file.flush()
+        self._records.write(observation, {"frames": frames})
 
     def close(self) -> None:
         """Close the file."""
-        if self._file is not None:
-            self._file.close()
+        self._records.close()
 
 
 def observations_beside(log: Path) -> Path | None:
@@ -113,32 +89,8 @@ def observations_beside(log: Path) -> Path | None:
 
 def read_observations(path: Path, kinds: Sequence[type[Any]]) -> Iterator[tuple[int, Observation]]:
     """(number of frames before it, observation) of those kinds, in the order of the file."""
-    known = {kind.__name__: kind for kind in kinds}
-    with path.open("rb") as file:
-        while len(start := file.read(_HEAD.size)) == _HEAD.size:
-            magic, head_size, body_size, crc = _HEAD.unpack(start)
-            if magic != _MAGIC or head_size + body_size > path.stat().st_size:
-                return
-            content = file.read(head_size + body_size)
-            if len(content) < head_size + body_size or zlib.crc32(content) != crc:
-                return
-            try:
-                header = json.loads(content[:head_size])
-                kind = known.get(header["kind"])
-                if kind is None:
-                    continue
-                body = zlib.decompressobj().decompress(content[head_size:], _MAX_BODY)
-                items = header.items()
-                values = {name[1:]: _value(value, body) for name, value in items if name.startswith(".")}
-                found = int(header["frames"]), kind(**values)
-            except (ValueError, TypeError, LookupError, AttributeError, RecursionError, zlib.error):
-                return  # no record of this program, though its checksum is right
-            yield found
-
-
-def _value(value: Any, body: bytes) -> Any:
-    if isinstance(value, dict):
-        shape = tuple(value["shape"])
-        array = np.frombuffer(body, value["dtype"], int(np.prod(shape)), value["start"])
-        return array.reshape(shape)
-    return tuple(value) if isinstance(value, list) else value
+    for header, observation in read_records(path, _MAGIC, kinds):
+        frames = header.get("frames")
+        if not isinstance(frames, int):
+            return
+        yield frames, observation

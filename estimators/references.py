@@ -32,7 +32,8 @@ MAX_BRIDGED_US: Final = 1_000_000
 """Longest gap of the reference that is interpolated, microseconds."""
 _LEAST_SPEED_M_S: Final = 1.0
 """Below this speed the direction of travel is not meaningful."""
-_TARGET_SYSTEM: Final = 251
+TARGET_SYSTEM: Final = 251
+"""MAVLink system id of the simulated targets' truth; the first target is component 1."""
 _SIMULATORS: Final = (25, 1)
 """Components that send the truth, the preferred one first: our SITL's, PX4's own."""
 
@@ -130,14 +131,14 @@ def target_reference(
     """
     name = "HIL_STATE_QUATERNION"
     known = sorted(
-        {key.component_id for key in log.keys if key.name == name and key.system_id == _TARGET_SYSTEM}
+        {key.component_id for key in log.keys if key.name == name and key.system_id == TARGET_SYSTEM}
     )
     if not known:
         return None
     component = number + 1 if number + 1 in known else known[0]
     if component != number + 1 and len(known) > 1:
         return None
-    table = log.table(name, system_id=_TARGET_SYSTEM, component_id=component, boot=boot)
+    table = log.table(name, system_id=TARGET_SYSTEM, component_id=component, boot=boot)
     frame = None if origin is None else LocalFrame(origin)
     return Reference(TRUTH, _from_hil_state(table, frame))
 
@@ -150,7 +151,7 @@ def targets_reference(
     """
     name = "HIL_STATE_QUATERNION"
     known = sorted(
-        {key.component_id for key in log.keys if key.name == name and key.system_id == _TARGET_SYSTEM}
+        {key.component_id for key in log.keys if key.name == name and key.system_id == TARGET_SYSTEM}
     )
     places = np.full((len(time_us), len(known), 2), np.nan)
     for k, component in enumerate(known):

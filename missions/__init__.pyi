@@ -1,6 +1,7 @@
 """Public names of `missions`, each where it is defined; see `__init__.py`."""
 
 from estimators.orbit_target.parameters import AttitudeFrom as AttitudeFrom
+from estimators.status_texts import StatusText as StatusText
 from missions.base.mission import Mission as Mission
 from missions.base.options import FlightOptions as FlightOptions
 from missions.base.options import MissionOptions as MissionOptions
@@ -52,7 +53,6 @@ from missions.vehicle.telemetry import LocalPosition as LocalPosition
 from missions.vehicle.telemetry import MissionProgress as MissionProgress
 from missions.vehicle.telemetry import Position as Position
 from missions.vehicle.telemetry import Pressure as Pressure
-from missions.vehicle.telemetry import StatusText as StatusText
 from missions.vehicle.vehicle import Vehicle as Vehicle
 from missions.vision_search.hidden_tag import HiddenTag as HiddenTag
 from missions.vision_search.options import LocalizeKind as LocalizeKind

@@ -3,11 +3,12 @@ one mission, one after another or at the same time, do not know each other.
 """
 
 import json
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Generic, ParamSpec, TypeVar
 
+from estimators.scene_items import Item
 from missions.base.options import MissionOptions
 from missions.base.report import Debriefing, Report, path_verdict_of_all
 from missions.errors import MissionError
@@ -48,6 +49,14 @@ class MissionFlight(Generic[AnyOptions]):
     async def fly(self) -> None:
         """Fly all vehicles."""
         await run_concurrently([self.fly_one(index) for index in range(len(self.vehicles))])
+
+    def shown(self) -> Mapping[str, Item]:
+        """What a viewer shows of the mission now, by name: its area, what it knows, what it has found.
+
+        Vehicles, commanded paths, phases and estimators are shown without it. It is read once a second of
+        vehicle time, and changes nothing. Positions are from the first vehicle's home.
+        """
+        return {}
 
     def report(self, debriefing: Debriefing) -> Report:
         """What is reported when the flight is over, whether it has come to its end or not."""

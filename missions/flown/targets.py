@@ -1,17 +1,13 @@
 """True places of the simulated targets, from the records of a flight."""
 
-from typing import Final
-
 import numpy as np
 from numpy.typing import NDArray
 
+from estimators.references import TARGET_SYSTEM
 from flightsim.foundation.geodesy import LocalFrame
 from missions.flown.records import FlightRecords, positions_ned_m
 
 Array = NDArray[np.float64]
-
-TARGET_SYSTEM: Final = 251
-"""MAVLink system id of the simulated targets' truth; the first target is component 1."""
 
 
 def true_targets(records: FlightRecords, frame: LocalFrame) -> list[tuple[Array, Array]]:

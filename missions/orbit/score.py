@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimators.received import GAP_S, broken_at_gaps, gaps_of, interpolated
+from estimators.references import TARGET_SYSTEM
 from estimators.tracking.metrics import rms
 from flightsim.foundation.geodesy import LocalFrame
 from missions.base.report import Debriefing
 from missions.flown.records import FlightRecords, place_of, positions_ned_m
-from missions.flown.targets import TARGET_SYSTEM
 from missions.orbit.options import OrbitOptions
 from missions.vehicle.notes import FlightNotes
 

@@ -5,8 +5,8 @@ from dataclasses import replace
 from typing import Final
 
 from autopilot_bridge.mavlink import dialect
+from estimators.status_texts import StatusText, StatusTextAssembler
 from missions.vehicle import px4_events
-from missions.vehicle.telemetry import StatusText, StatusTextAssembler
 
 _KEPT: Final = 50
 _SHOWN_LEAST: Final = 3

@@ -9,12 +9,8 @@ from typing import Final, Generic, NamedTuple, TypeVar, cast
 
 from autopilot_bridge.mavlink import Frame, MAVLinkMessage, dialect, field_reader
 from autopilot_bridge.mavlink.wire_units import UNKNOWN_UINT16, m_s, metres, place
-from flightsim.foundation.plain_text import plain_text
 
 T = TypeVar("T")
-
-_CHUNK: Final = 50
-_UNFINISHED_TEXTS: Final = 8
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -103,21 +99,6 @@ class Gps:
     fix_type: int
     satellites: int
     hdop: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class StatusText:
-    """A text for the pilot.
-
-    Attributes:
-        severity: as MAV_SEVERITY (3 error, 4 warning, 6 information).
-        text: the text, or the words of an event that has none.
-        received_us: vehicle time at which it was complete.
-    """
-
-    severity: int
-    text: str
-    received_us: int = 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -245,35 +226,3 @@ _SOURCES: Final[Mapping[type, Source[object]]] = MappingProxyType(
 def source_of(kind: type[T]) -> Source[T]:
     """The source of a kind of telemetry."""
     return cast(Source[T], _SOURCES[kind])
-
-
-class StatusTextAssembler:
-    """Joins STATUSTEXTs that were sent in chunks of 50 characters (id, chunk_seq).
-
-    A text whose end is lost is dropped when its id is used again, or when 8 other texts are unfinished.
-    """
-
-    def __init__(self) -> None:
-        self._parts: dict[int, dict[int, str]] = {}
-
-    def add(self, m: dialect.MAVLink_statustext_message) -> StatusText | None:
-        """Add one message; returns the text when it is complete."""
-        text = str(m.text)
-        if not m.id:
-            return _status_text(m.severity, text)
-        parts = self._parts.pop(m.id, {})
-        newest = max(parts, default=-1)
-        if m.chunk_seq < newest or parts.get(m.chunk_seq, text) != text:
-            parts = {}  # chunks come in order, so the id is now used for another text
-        parts[m.chunk_seq] = text
-        if len(text) >= _CHUNK:
-            self._parts[m.id] = parts  # stored as the newest
-            if len(self._parts) > _UNFINISHED_TEXTS:
-                del self._parts[next(iter(self._parts))]
-            return None
-        return _status_text(m.severity, "".join(parts[k] for k in sorted(parts)))
-
-
-def _status_text(severity: int, text: str) -> StatusText:
-    """A whole text, as it may be shown; PX4 ends texts that it also sends as events with a tab."""
-    return StatusText(severity=severity, text=plain_text(text.rstrip("\t")))

@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 
 from autopilot_bridge.mavlink import FrameEncoder, FrameParser, decode, dialect
 from autopilot_bridge.sitl import Sitl
+from estimators.status_texts import StatusTextAssembler
 from flightsim import truth as t
 from flightsim.environment import Environment
 from flightsim.interface import MAX_ACTUATORS
 from flightsim.payload import GroundTargetParameters, PayloadParameters
 from flightsim.sensors import SensorSuiteParameters
 from flightsim.world_spec import VehicleSpec, WorldSpec
-from missions.vehicle.telemetry import StatusTextAssembler
 from tests.rotations import yaw_rad
 
 FLAVOURS: Final = ("px4", "ardupilot")

@@ -11,6 +11,7 @@ from autopilot_bridge.clock import LoopClock, TelemetryClock, run
 from autopilot_bridge.links import memory_pair
 from autopilot_bridge.mavlink import FrameEncoder, dialect
 from autopilot_bridge.mission_plan import MissionItem
+from estimators.status_texts import StatusTextAssembler
 from missions.errors import CommandRejected, MissionError, TakenOver, VehicleTimeout
 from missions.vehicle import Mode, Setpoint, Vehicle
 from missions.vehicle.concurrency import run_concurrently
@@ -20,7 +21,6 @@ from missions.vehicle.telemetry import (
     Battery,
     LocalPosition,
     Position,
-    StatusTextAssembler,
     air_data,
     attitude,
     local_position,

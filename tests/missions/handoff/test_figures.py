@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from estimators.references import TARGET_SYSTEM
 from missions.flown.records import FlightRecords
-from missions.flown.targets import TARGET_SYSTEM
 from missions.handoff.figures import handoff_truth
 from tests.missions.orbit.test_score import truth_frames
 

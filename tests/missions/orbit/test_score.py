@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from autopilot_bridge.mavlink import FrameEncoder, dialect
+from estimators.references import TARGET_SYSTEM
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from missions.base.report import Debriefing
 from missions.flown.records import FlightRecords
 from missions.flown.score import score
-from missions.flown.targets import TARGET_SYSTEM
 from missions.orbit.mission import orbit_lines
 from missions.orbit.options import OrbitOptions
 from missions.orbit.picture import draw_orbit

@@ -1,0 +1,80 @@
+"""The file `flight.scene` beside the log of a run: what its mission and its estimators showed.
+
+The messages are in the log; with both, a recorded run gives the scene that was live.
+"""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Final, get_args
+
+from estimators.dataclass_records import RecordWriter, read_records
+from estimators.scene.shown import Shown, Subject
+from estimators.scene_items import Placed, Relative, Role
+from flightsim.foundation.geodesy import GeodeticPosition
+
+__all__ = ["SUFFIX", "SceneWriter", "read_scene", "scene_beside"]
+
+SUFFIX: Final = ".scene"
+_MAGIC: Final = b"FSS1"
+_KINDS: Final[tuple[type[Any], ...]] = get_args(Placed)
+
+
+class SceneWriter:
+    """Writes what is shown; the file is created with the first item.
+
+    Args:
+        path: the file; it must not exist.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._records = RecordWriter(path, _MAGIC)
+
+    def write(self, shown: Shown) -> None:
+        """Append an item.
+
+        Raises:
+            OSError: the file exists, or can't be written.
+        """
+        item, origin = shown.item, shown.origin
+        about: dict[str, Any] = {
+            "base": shown.subject.base,
+            "system_id": shown.subject.system_id,
+            "name": shown.name,
+            "time_us": shown.time_us,
+            "origin": None if origin is None else (origin.lat_deg, origin.lon_deg, origin.alt_m),
+        }
+        if isinstance(item, Relative):
+            about["relative_to"] = item.system_id
+            self._records.write(item.item, about)
+        else:
+            self._records.write(item, about)
+
+    def close(self) -> None:
+        """Close the file."""
+        self._records.close()
+
+
+def scene_beside(log: Path) -> Path | None:
+    """The recorded scene of a log's run; None when it has none."""
+    path = log.with_suffix(SUFFIX)
+    return path if path.is_file() else None
+
+
+def read_scene(path: Path) -> Iterator[Shown]:
+    """What was shown, in order; a damaged record ends it."""
+    for header, item in read_records(path, _MAGIC, _KINDS):
+        try:
+            subject = Subject(base=str(header["base"]), system_id=int(header["system_id"]))
+            place = header["origin"]
+            origin = None
+            if place is not None:
+                lat_deg, lon_deg, alt_m = map(float, place)
+                origin = GeodeticPosition(lat_deg=lat_deg, lon_deg=lon_deg, alt_m=alt_m)
+            item = replace(item, role=Role(item.role)) if hasattr(item, "role") else item
+            relative_to = header.get("relative_to")
+            found = item if relative_to is None else Relative(item=item, system_id=int(relative_to))
+            shown = Shown(subject, str(header["name"]), int(header["time_us"]), origin, found)
+        except (ValueError, TypeError, LookupError):
+            return
+        yield shown
