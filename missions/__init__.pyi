@@ -31,6 +31,11 @@ from missions.pattern_search.tag_target import TagTarget as TagTarget
 from missions.pattern_search.world import tag_search_world as tag_search_world
 from missions.plan_files.options import FileOptions as FileOptions
 from missions.plan_files.options import Then as Then
+from missions.runs.check import Verdict as Verdict
+from missions.runs.check import check_run as check_run
+from missions.runs.limits import Limit as Limit
+from missions.runs.limits import Limits as Limits
+from missions.runs.limits import read_limits as read_limits
 from missions.runs.run import Run as Run
 from missions.runs.run import open_run as open_run
 from missions.runs.session import RunResult as RunResult

@@ -207,7 +207,10 @@ class Conversion:
             return beside if ("/" in value or beside.is_file()) and beside.exists() else value
         refused = Refused(value, _IN_PYTHON)
         if not self._text:
-            kinds = {each for each in kinds if isinstance(each, type) and issubclass(each, Enum)}
+            members = {each for each in kinds if isinstance(each, type) and issubclass(each, Enum)}
+            if not members and type(value) in kinds & {bool, int, float, str}:  # it is typed already
+                return self.value(type(value), value)
+            kinds = members
         for each in sorted(kinds, key=lambda k: k is str):  # every text is a str, so it is tried last
             try:
                 return self.value(each, value)

@@ -22,6 +22,7 @@ _COMMANDS: Final = {
     "fly": ("missions.cli.fly", "fly", "Fly a mission: on an embedded SITL, or on any vehicle."),
     "sitl": ("missions.cli.sitl", "sitl", "SITL for other people's clients."),
     "report": ("missions.cli.report", "report", "Summary and picture from the log of a killed program."),
+    "check": ("missions.cli.check", "check", "Runs and logs against limits, for continuous integration."),
     "log": ("missions.cli.log", "log", "Look into logs, and make others of them."),
     "estimate": ("missions.cli.estimate", "estimate", "An estimator on a live link, a process of its own."),
     "replay": ("missions.cli.replay", "replay", "Logs through an estimator, and how far off it was."),
