@@ -270,7 +270,7 @@ def junit(verdicts: Sequence[Verdict]) -> bytes:
         own = [verdict for verdict in verdicts if verdict.run == run]
         failed = sum(bool(verdict.failures) for verdict in own)
         counts = {"tests": str(len(own)), "failures": str(failed), "errors": "0", "skipped": "0"}
-        suite = ElementTree.SubElement(suites, "testsuite", name=run, **counts)
+        suite = ElementTree.SubElement(suites, "testsuite", {"name": run} | counts)
         for verdict in own:
             case = ElementTree.SubElement(suite, "testcase", classname=run, name=verdict.name, time="0")
             if verdict.failures:

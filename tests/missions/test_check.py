@@ -133,7 +133,7 @@ def test_against_a_golden_run(tmp_path: Path, error_m: float, code: int) -> None
         ("x = 1", "limits.toml: x is unknown; accepted are check"),
         ("# nothing", "limits.toml: check is missing"),
         ("check = []", "limits.toml: it has no [[check]]"),
-        ("x =", "limits.toml is not TOML: Invalid value (at line 1"),
+        ("x =", "limits.toml is not TOML: Invalid value"),
         ('[[check]]\nlog = "x"\nmost = "a"', "check[1].most: 'a' is not a number"),
         ('[[check]]\nlog = "x"', "give least, most, equals, within or within_share"),
         ("[[check]]\nmost = 1", "give one of summary, log, message, estimator and track"),
