@@ -52,7 +52,60 @@ _LEAST_UNIX_US: Final = 946_684_800_000_000
 _TOGETHER_US: Final = 2_000
 """SYSTEM_TIME counts milliseconds: boots that are closer together are treated as simultaneous."""
 _STEP_US: Final = 500_000
-"""If a clock differs from its earlier value by more than this, it was set or its vehicle has rebooted."""
+"""If a boot differs from the known one by more than this, the clock was set."""
+_STEADY_US: Final = 20_000
+_STEADY_RATE: Final = 1e-3  # Unix time and vehicle time drift by less: quartzes, and NTP's 500 ppm
+_CHANGES_MAX: Final = 3
+
+
+@dataclass(slots=True)
+class _UnixBoot:
+    """Unix time at which a vehicle booted, while its Unix time advances with its vehicle time.
+
+    Attributes:
+        boot_us: Unix time of the boot; None: the two times have different rates, so there is no such time.
+        since_us: vehicle time at which it was learnt.
+        newest_us: newest vehicle time.
+        other: vehicle time and boot of the newest message that differs; None: none since one that agrees.
+        differing: number of messages in a row that differ.
+        changes: how often the boot was another one.
+    """
+
+    boot_us: int | None
+    since_us: int
+    newest_us: int
+    other: tuple[int, int] | None = None
+    differing: int = 0
+    changes: int = 0
+
+    @classmethod
+    def first(cls, time_us: int, boot_us: int) -> "_UnixBoot":
+        return cls(boot_us, time_us, time_us)
+
+    def learn(self, time_us: int, boot_us: int) -> None:
+        self.newest_us = max(self.newest_us, time_us)
+        if self.boot_us is None:
+            return
+        if _steady(time_us - self.since_us, boot_us - self.boot_us):
+            self.other, self.differing = None, 0
+            return
+        before, self.other = self.other, (time_us, boot_us)
+        self.differing += 1
+        if before is not None and _steady(time_us - before[0], boot_us - before[1]):
+            self.changes += 1
+            self.other, self.differing = None, 0
+            if abs(boot_us - self.boot_us) > _STEP_US:
+                self.boot_us, self.since_us = boot_us, time_us
+        if max(self.differing, self.changes) > _CHANGES_MAX:
+            self.boot_us = None
+
+    def rebooted(self, time_us: int) -> bool:
+        """Whether a time is of a later boot of the vehicle."""
+        return time_us < self.newest_us - FAR_BACK_US or 2 * time_us < self.newest_us - LATE_US
+
+
+def _steady(elapsed_us: int, change_us: int) -> bool:
+    return abs(change_us) <= _STEADY_US + _STEADY_RATE * abs(elapsed_us)
 
 
 class TeamTime:
@@ -61,11 +114,12 @@ class TeamTime:
     The Unix time of a vehicle's boot is taken from its first SYSTEM_TIME and then kept, because the message
     has a resolution of milliseconds and its jitter must not affect the estimates. As long as a vehicle's boot
     isn't known (embedded SITL boots all vehicles together; a GPS receiver may not know the time yet), its
-    time is not converted.
+    time is not converted. Neither is that of a vehicle whose Unix time does not advance with its vehicle time:
+    in a simulation in lockstep PX4 sends the computer's time of day, which runs slower or faster.
     """
 
     def __init__(self) -> None:
-        self._boots_us: dict[int, int] = {}
+        self._boots: dict[int, _UnixBoot] = {}
         self._reference_us: int | None = None
 
     def learn(self, time_us: int, message: wire.SYSTEM_TIME) -> None:
@@ -73,20 +127,22 @@ class TeamTime:
         if message.time_unix_usec < _LEAST_UNIX_US:
             return
         boot_us = message.time_unix_usec - time_us
-        known_us = self._boots_us.get(message.src_system)
         if self._reference_us is None:
             self._reference_us = boot_us
         if abs(boot_us - self._reference_us) <= _TOGETHER_US:
             boot_us = self._reference_us
-        if known_us is None or abs(boot_us - known_us) > _STEP_US:
-            self._boots_us[message.src_system] = boot_us
+        known = self._boots.get(message.src_system)
+        if known is None or known.rebooted(time_us):
+            self._boots[message.src_system] = _UnixBoot.first(time_us, boot_us)
+        else:
+            known.learn(time_us, boot_us)
 
     def common_us(self, time_us: int, system_id: int) -> int:
         """The common time for a vehicle's time."""
-        boot_us = self._boots_us.get(system_id)
-        if boot_us is None or self._reference_us is None:
+        known = self._boots.get(system_id)
+        if known is None or known.boot_us is None or self._reference_us is None:
             return time_us
-        return time_us + boot_us - self._reference_us
+        return time_us + known.boot_us - self._reference_us
 
 
 def stamp_field(name: str, fields: Container[str]) -> tuple[str, int] | None:

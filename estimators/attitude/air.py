@@ -14,11 +14,16 @@ _AIRSPEED_MAX_M_S: Final = 400.0
 _HPA: Final = 100.0
 
 
-def pressure_pa(value: float) -> float | None:
-    """Static pressure from a field in hectopascal. PX4 fills HIGHRES_IMU's field in pascal. None: no
-    pressure.
+def pressure_unit_pa(static: float) -> float:
+    """Pascals in the unit of a message's pressures, by its static pressure: PX4 1.16 fills those of
+    HIGHRES_IMU in pascal, later ones and other autopilots in hectopascal, as MAVLink has them.
     """
-    pascal = value * _HPA if value <= _HECTOPASCAL_MAX else value
+    return 1.0 if static > _HECTOPASCAL_MAX else _HPA
+
+
+def pressure_pa(value: float) -> float | None:
+    """Static pressure from a field of that unit. None: no pressure."""
+    pascal = value * pressure_unit_pa(value)
     return pascal if _LEAST_PA <= pascal <= 1.2 * SEA_LEVEL_PRESSURE_PA else None
 
 
@@ -64,11 +69,13 @@ class AirData:
             return None
         return equivalent_m_s * self._ratio
 
-    def by_pressure(self, time_us: int, difference_hpa: float) -> float | None:
-        """True airspeed, m/s, from a differential pressure in hectopascal; None as in `airspeed`."""
-        if not (isfinite(difference_hpa) and difference_hpa > 0.0):
+    def by_pressure(self, time_us: int, static: float, difference: float) -> float | None:
+        """True airspeed, m/s, from the static and the differential pressure of a message, in the unit of
+        `pressure_unit_pa`; None as in `airspeed`.
+        """
+        if not (isfinite(difference) and difference > 0.0):
             return None
-        equivalent = sqrt(2.0 * difference_hpa * _HPA / SEA_LEVEL_DENSITY_KG_M3)
+        equivalent = sqrt(2.0 * difference * pressure_unit_pa(static) / SEA_LEVEL_DENSITY_KG_M3)
         return self.airspeed(time_us, AirspeedSource.PRESSURE, equivalent)
 
     def _best(self, time_us: int, source: AirspeedSource) -> bool:

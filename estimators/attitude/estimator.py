@@ -229,7 +229,7 @@ class AttitudeEstimator(Estimator[AttitudeParameters]):
         elif refused is not None:
             return refused
         self._air.static_pressure(message.press_abs)
-        self._use_airspeed(time_us, self._air.by_pressure(time_us, message.press_diff))
+        self._use_airspeed(time_us, self._air.by_pressure(time_us, message.press_abs, message.press_diff))
         return Outcome.USED if refused is None else refused
 
     def _use_airspeed(self, time_us: int, airspeed_m_s: float | None) -> None:
@@ -250,7 +250,8 @@ class AttitudeEstimator(Estimator[AttitudeParameters]):
         if message.id != self._instance or (updated & INERTIAL_FIELDS != INERTIAL_FIELDS and updated):
             return Outcome.IGNORED
         if updated & DIFFERENTIAL_PRESSURE and message.diff_pressure > 0.0:
-            self._use_airspeed(time_us, self._air.by_pressure(time_us, message.diff_pressure))
+            airspeed_m_s = self._air.by_pressure(time_us, message.abs_pressure, message.diff_pressure)
+            self._use_airspeed(time_us, airspeed_m_s)
         return self._imu(time_us, message)
 
     def _raw_imu(self, time_us: int, message: wire.RAW_IMU) -> Outcome:

@@ -143,7 +143,6 @@ class HandoffEstimator(Estimator[HandoffSettings]):
         self.counts: Counter[str] = self._assembler.counts
         self.decision: HandoffDecision | None = None
         self.released = False
-        self._offset_us = 0  # of the own clock
         self._sent_us: int | None = None
         self._motion_sent_us: int | None = None
         self._number = self._motion_number = 0
@@ -160,7 +159,7 @@ class HandoffEstimator(Estimator[HandoffSettings]):
         ):
             self._now_us = time_us
             if message.time_usec < UNIX_TIME_US:
-                self._offset_us = time_us - message.time_usec
+                self.sight.offset_us = time_us - message.time_usec
         if is_a(message, wire.TUNNEL):
             return self._tunnel(time_us, message)
         outcome = self.sight.take(time_us, message)
@@ -313,7 +312,7 @@ class HandoffEstimator(Estimator[HandoffSettings]):
             self._outbox += track_report_messages(
                 system=self.own,
                 report=self._number,
-                time_us=taken_us - self._offset_us,
+                time_us=taken_us - self.sight.offset_us,
                 target=designation.number or 0,
                 identity=designation.probability,
                 released=self.released,
@@ -347,7 +346,7 @@ class HandoffEstimator(Estimator[HandoffSettings]):
         self._outbox.append(
             motion_message(
                 self._state.report(
-                    system=self.own, number=self._motion_number, time_us=time_us - self._offset_us
+                    system=self.own, number=self._motion_number, time_us=time_us - self.sight.offset_us
                 )
             )
         )
@@ -399,7 +398,7 @@ class HandoffEstimator(Estimator[HandoffSettings]):
         decision = HandoffDecision(
             system=self.own,
             number=self._number,
-            time_us=time_us - self._offset_us,
+            time_us=time_us - self.sight.offset_us,
             decided=self.process.comparison.decided is not None,
             target=report.number,
             probability=probability,

@@ -65,6 +65,8 @@ class AircraftSight:
         path: motion of the aircraft.
         tracks: what moves on the ground.
         height: over the ground.
+        offset_us: from the aircraft's own time, which its camera and its gimbal send, to the time of the
+            inertial messages, which is that of the team.
         counts: scans by what became of them; "malformed" messages.
         seen: image points of the tracks in the newest scan, by number.
     """
@@ -82,6 +84,7 @@ class AircraftSight:
         self.path = ReckonedPath(_PATH_S)
         self.tracks = AircraftTracks(tracker, keep_s, self.path.newest)
         self.height = GroundHeight(ground_m)
+        self.offset_us = 0
         self._tilt_sigma_rad = tilt_sigma_rad
         self._gimbal = GimbalHistory()
         self._scans = ScanAssembler()
@@ -123,7 +126,8 @@ class AircraftSight:
         return outcomes[-1] if outcomes else Outcome.USED
 
     def _scan(self, scan: PointScan) -> Outcome:
-        gimbal, taken = self._gimbal.at(scan.time_us), self.path.at(scan.time_us)
+        time_us = scan.time_us + self.offset_us
+        gimbal, taken = self._gimbal.at(scan.time_us), self.path.at(time_us)
         if gimbal is None or taken is None:
             self.counts["unplaced"] += 1
             return Outcome.WAITING
@@ -133,7 +137,7 @@ class AircraftSight:
         if found is None:
             self.counts["unplaced"] += 1
             return Outcome.WAITING
-        self.tracks.scan(scan.time_us, *found, taken=taken)
+        self.tracks.scan(time_us, *found, taken=taken)
         points = {
             number: image_point(place, gimbal, heading_rad, self.height_m)
             for number, place in self.tracks.level(taken).items()

@@ -10,7 +10,7 @@ from autopilot_bridge.mavlink import DEFINITIONS, FrameParser
 from estimators.logs.dialect import load_dialect
 from estimators.logs.tlog import TlogSource
 from estimators.messages import message_class, read_message
-from estimators.vehicle_time import VehicleTime, stamp_field, vehicle_times
+from estimators.vehicle_time import TeamTime, VehicleTime, stamp_field, vehicle_times
 from tests.estimators.logs.reference import pack, tlog
 
 
@@ -38,6 +38,36 @@ def speed(**source):
 def stamps(*messages):
     clock = VehicleTime()
     return [clock.stamp(item) for item in messages]
+
+
+UNIX_US = 1_790_000_000_000_000
+
+
+def common_s(rates, seconds=60, set_at=None, set_by_s=0.0, boots=(0.0, 40.0)):
+    """Common times of two vehicles at a time of their own, whose Unix times have rates and are set once."""
+    time = TeamTime()
+    for k in range(1, seconds + 1):
+        for system, (rate, boot_s) in enumerate(zip(rates, boots, strict=True), start=1):
+            own_us = 1_000_000 * k + 300_000 * system
+            ahead_s = boot_s + rate * own_us * 1e-6 + (set_by_s if set_at is not None and k >= set_at else 0.0)
+            unix_us = UNIX_US + round(1e3 * ahead_s) * 1000
+            sent = dialect.MAVLink_system_time_message(unix_us, own_us // 1000)
+            time.learn(own_us, message(sent, system=system))
+    return tuple(time.common_us(5_000_000, system) * 1e-6 for system in (1, 2))
+
+
+def test_team_time_by_the_boots_of_the_vehicles():
+    assert common_s((1.0, 1.00005)) == pytest.approx((5.0, 45.0), abs=0.003)
+
+
+@pytest.mark.parametrize("rate", [0.2, 0.98, 1.02, 5.0])
+def test_a_unix_time_that_runs_apart_from_the_vehicle_time_converts_nothing(rate):
+    """PX4 in lockstep with a simulation sends the computer's time of day."""
+    assert common_s((rate, rate), boots=(0.0, 0.0)) == (5.0, 5.0)
+
+
+def test_a_clock_that_is_set_once_counts_from_then_on():
+    assert common_s((1.0, 1.0), set_at=20, set_by_s=7.0) == pytest.approx((12.0, 52.0), abs=0.003)
 
 
 def test_own_stamp_or_the_newest():

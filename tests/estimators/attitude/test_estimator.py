@@ -298,6 +298,14 @@ def test_differential_pressure_of_highres_imu_counts_where_it_is_marked():
     assert newest(found).airspeed_m_s == pytest.approx(20.0, rel=1e-6)
 
 
+def test_differential_pressure_of_highres_imu_in_pascal():
+    """PX4 1.16.1 fills both pressures of HIGHRES_IMU in pascal; seen: 95617 and 281 at 21 m/s."""
+    found = wing(airspeed="pressure")
+    marked = {"fields_updated": 8191, "abs_pressure": 101_325.0, "diff_pressure": 0.5 * 1.225 * 20.0**2}
+    found.handle(STEP_US, highres(STEP_US, **marked))
+    assert newest(found).airspeed_m_s == pytest.approx(20.0, rel=1e-6)
+
+
 def test_old_airspeed_is_not_used():
     found = wing()
     found.handle(10, made("VFR_HUD", airspeed=20.0))

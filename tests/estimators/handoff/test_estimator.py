@@ -61,6 +61,18 @@ def test_the_same_frames_give_the_same_numbers_to_the_bit(decided):
         assert sent
 
 
+def test_scans_are_placed_when_the_aircraft_have_not_booted_together():
+    """Camera and gimbal send the time of their own aircraft."""
+    scene = Scene()
+    for system, boot_unix_s in ((HANDOFF, 1_790_000_000), (TRACKER, 1_790_000_100)):
+        unix_us = 1_000_000 * boot_unix_s + 500_000
+        scene.say(dialect.MAVLink_system_time_message(unix_us, 500), system)
+    scene.fly(4.0)
+    for system in (HANDOFF, TRACKER):
+        sight = scene.estimator(system).sight
+        assert sight.tracks.places and sight.counts["unplaced"] <= 2, (system, sight.counts)
+
+
 def encoded(message, system, component=191):
     (frame,) = FrameParser().feed(FrameEncoder(system, component).encode(message))
     return frame
