@@ -114,8 +114,8 @@ class TeamTime:
     The Unix time of a vehicle's boot is taken from its first SYSTEM_TIME and then kept, because the message
     has a resolution of milliseconds and its jitter must not affect the estimates. As long as a vehicle's boot
     isn't known (embedded SITL boots all vehicles together; a GPS receiver may not know the time yet), its
-    time is not converted. Neither is that of a vehicle whose Unix time does not advance with its vehicle time:
-    in a simulation in lockstep PX4 sends the computer's time of day, which runs slower or faster.
+    time is not converted. Neither is that of a vehicle whose Unix time does not advance with its vehicle
+    time: in a simulation in lockstep PX4 sends the computer's time of day, which runs slower or faster.
     """
 
     def __init__(self) -> None:

@@ -49,8 +49,8 @@ def common_s(rates, seconds=60, set_at=None, set_by_s=0.0, boots=(0.0, 40.0)):
     for k in range(1, seconds + 1):
         for system, (rate, boot_s) in enumerate(zip(rates, boots, strict=True), start=1):
             own_us = 1_000_000 * k + 300_000 * system
-            ahead_s = boot_s + rate * own_us * 1e-6 + (set_by_s if set_at is not None and k >= set_at else 0.0)
-            unix_us = UNIX_US + round(1e3 * ahead_s) * 1000
+            set_s = set_by_s if set_at is not None and k >= set_at else 0.0
+            unix_us = UNIX_US + round(1e3 * (boot_s + rate * own_us * 1e-6 + set_s)) * 1000
             sent = dialect.MAVLink_system_time_message(unix_us, own_us // 1000)
             time.learn(own_us, message(sent, system=system))
     return tuple(time.common_us(5_000_000, system) * 1e-6 for system in (1, 2))
