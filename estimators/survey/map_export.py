@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from estimators.errors import EstimatorError
 from estimators.logs.new_file import new_file
+from estimators.survey.geotiff import write_geotiff
 from estimators.survey.map_places import WGS84, grid_degrees, library
 from flightsim.foundation.magnetic_map_file import MapContents
 
@@ -58,27 +59,10 @@ def _write_geotiff(contents: MapContents, path: Path, part: Path) -> None:
                 f"{path}: {name} of the map is spaced {steps.min():g} to {steps.max():g} m, and a GeoTIFF "
                 "has even spacing; accepted is netCDF (.nc)"
             )
-    rasterio, affine = library("rasterio", path), library("rasterio.transform", path).Affine
-    lat, lon = grid_degrees(contents.home, contents.north_m, contents.east_m)
-    step_lat, step_lon = (lat[-1] - lat[0]) / (lat.size - 1), (lon[-1] - lon[0]) / (lon.size - 1)
     bands = _bands(contents)
-    with rasterio.open(
-        part,
-        "w",
-        driver="GTiff",
-        height=lat.size,
-        width=lon.size,
-        count=len(bands),
-        dtype="float64",
-        crs=WGS84.text,
-        transform=affine(step_lon, 0.0, lon[0] - 0.5 * step_lon, 0.0, -step_lat, lat[-1] + 0.5 * step_lat),
-        nodata=np.nan,
-        compress="deflate",
-    ) as dataset:
-        dataset.update_tags(**_metadata(contents))
-        dataset.descriptions = tuple(bands)
-        dataset.units = tuple(_UNITS[name] for name in bands)
-        dataset.write(np.stack([values[::-1] for values in bands.values()]))  # rows from the north
+    units = [_UNITS[name] for name in bands]
+    axes = contents.north_m, contents.east_m
+    write_geotiff(path, part, contents.home, axes, bands, units=units, about=_metadata(contents))
 
 
 def _write_netcdf(contents: MapContents, path: Path, part: Path) -> None:

@@ -12,7 +12,7 @@ from missions.cli.declared_options import declared_options
 from missions.cli.later import body_in
 from missions.cli.options import in_options
 from missions.cli.signing import key_option
-from missions.estimation.log_options import ExportOptions, LogSelection, PlayOptions
+from missions.estimation.log_options import CoverageOptions, ExportOptions, LogSelection, PlayOptions
 
 _BODIES: Final = "missions.cli.bodies.log"
 _SELECTION: Final = declared_options(LogSelection)
@@ -73,6 +73,32 @@ def info() -> None:
 @body_in(_BODIES)
 def export() -> None:
     """Write messages to other tools' formats: Parquet, CSV, NumPy, MCAP."""
+
+
+@log.command(params=[*declared_options(CoverageOptions)])
+@click.argument("paths", nargs=-1, required=True, metavar="LOG...", type=click.Path(path_type=Path))
+@_dialect_option
+@click.option(
+    "--camera",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Description of the camera (docs/vision.md), or a calibration of one that looks down.",
+)
+@click.option(
+    "--area",
+    type=click.Path(path_type=Path),
+    metavar="FILE.geojson",
+    help="Polygon of the searched area. [default: the rectangle that was seen]",
+)
+@click.option(
+    "--out", type=click.Path(path_type=Path), metavar="FOLDER", help="New folder. [default: runs/coverage-N]"
+)
+@body_in(_BODIES)
+def coverage() -> None:
+    """Swept area and probability of detection of flights with a camera or a sensor of a sweep width.
+
+    The flights of all logs count together. FOLDER gets coverage.json, coverage.png and coverage.tif.
+    """
 
 
 @log.command(params=[*_SELECTION])

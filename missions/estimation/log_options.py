@@ -1,7 +1,9 @@
 """What users set of the commands that look into logs."""
 
 from dataclasses import dataclass
+from enum import StrEnum
 
+from estimators.coverage.parameters import CoverageParameters
 from estimators.user_choices import ExportFormat
 from flightsim.foundation.options import option
 from missions.base.options import PlanOptions
@@ -36,6 +38,23 @@ class ExportOptions(PlanOptions):
     """How messages are written for other tools."""
 
     format: ExportFormat = option(ExportFormat.CSV, help="Format of the files.")
+
+
+class TrackBy(StrEnum):
+    """Whose track counts."""
+
+    BEST = "best"
+    """The truth where a log has it, else the autopilot's."""
+    AUTOPILOT = "autopilot"
+    TRUTH = "truth"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CoverageOptions(CoverageParameters):
+    """What users set of the coverage of flights."""
+
+    track_by: TrackBy = option(TrackBy.BEST, help="Source of the tracks; best: the truth where a log has it.")
+    system_id: int | None = option(None, least=1, most=255, varies="all", help="System id of the vehicle.")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -10,7 +10,7 @@ import click
 
 from autopilot_bridge.errors import BridgeError
 from autopilot_bridge.links import open_link, parse_address
-from estimators.errors import NothingThere
+from estimators.errors import EstimatorError, NothingThere
 from estimators.logs import Log, open_log, report_of
 from estimators.logs.condition import Condition
 from estimators.logs.dialect import load_dialect
@@ -25,7 +25,9 @@ from missions.cli.bodies.signing import key_from, warn_if_open
 from missions.cli.bodies.status_line import StatusLine
 from missions.cli.declared_options import specified
 from missions.cli.options import in_options
-from missions.estimation.log_options import ExportOptions, LogSelection, PlayOptions
+from missions.errors import PlanError
+from missions.estimation.coverage import assess_coverage
+from missions.estimation.log_options import CoverageOptions, ExportOptions, LogSelection, PlayOptions
 from missions.runs.log_play import MIN_SPEED, Played
 from missions.runs.log_play import play as send
 from missions.vehicle.signing import client_signing
@@ -93,6 +95,37 @@ def export(path: Path, dialect: str | None, si: bool, out: Path | None, **_decla
     written = write(opened, _select(opened), target, form, si=si)
     what = f"{len(written)} files in {target}" if len(written) > 1 else str(written[0])
     click.echo(f"written: {what}")
+
+
+def coverage(
+    paths: Sequence[Path],
+    dialect: str | None,
+    camera: Path | None,
+    area: Path | None,
+    out: Path | None,
+    **_declared: Any,
+) -> None:
+    """`flightstack log coverage`."""
+    try:
+        made = assess_coverage(
+            [_open(path, dialect) for path in paths],
+            specified(CoverageOptions),
+            camera=camera,
+            area=area,
+            out=out,
+        )
+    except (EstimatorError, PlanError) as error:
+        raise click.UsageError(in_options(error)) from error
+    figures = made.coverage.figures
+    click.echo(
+        f"{figures['swept_share']:.1%} of {figures['area_m2']:.0f} m2 swept, POD {figures['pod']:.1%}, "
+        f"track of {figures['track_m']:.0f} m over the area ({figures['track_by']})"
+    )
+    if figures["coverage"] is not None:
+        click.echo(f"coverage {figures['coverage']:.3g} with a sweep width of {figures['sweep_width_m']:g} m")
+    for remark in made.remarks:
+        click.echo(remark, err=True)
+    click.echo(f"written: {', '.join(made.written)} in {made.folder}")
 
 
 def cut(path: Path, out: Path, dialect: str | None, **_declared: Any) -> None:
