@@ -441,7 +441,7 @@ def longitude_differences(source):
 
 def test_longitudes_are_subtracted_in_one_place():
     """Elsewhere `LocalFrame` and `HomeFrame` make metres of places: a longitude jumps at 180 degrees."""
-    evenly = "estimators.survey.map_export"  # the step of a grid whose longitudes may pass 180 degrees
+    evenly = "estimators.survey.geotiff"  # the step of a grid whose longitudes may pass 180 degrees
     found = found_by_module(
         lambda name: longitude_differences(source_of(name)), without=("flightsim.foundation.geodesy", evenly)
     )

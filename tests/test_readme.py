@@ -154,7 +154,7 @@ def unknown_names(text: str, known: dict[str, Path]) -> list[str]:
 
 OBJECTS: Final = frozenset({"flight", "vehicle", "wire"})
 """Folders and modules of a package whose name is mostly an object's or a file's: `vehicle.latest`."""
-ENDINGS: Final = "md|npz|png|py|tlog|toml"
+ENDINGS: Final = "json|md|npz|png|py|tif|tlog|toml"
 
 
 def unknown_short_names(text: str, known: dict[str, Path]) -> list[str]:

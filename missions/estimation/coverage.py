@@ -7,6 +7,7 @@ from pathlib import Path
 
 from estimators.coverage.coverage import Coverage, coverage_of
 from estimators.coverage.files import read_area, write_coverage_geotiff
+from estimators.coverage.picture import draw_coverage
 from estimators.errors import EstimatorError
 from estimators.flown_track import flown_tracks, has_truth
 from estimators.logs import Log
@@ -69,8 +70,6 @@ def assess_coverage(
     written, remarks = ["coverage.json"], []
     with new_file(folder / "coverage.json") as part:
         part.write_text(json.dumps(finite(coverage.figures), indent=2) + "\n", encoding="utf-8")
-    from estimators.coverage.picture import draw_coverage  # Matplotlib
-
     title = ", ".join(log.path.name for log in logs)
     with new_file(folder / "coverage.png") as part:
         draw_coverage(part, title, coverage, tracks)

