@@ -36,6 +36,7 @@ from estimators.target_fusion import TargetFusionEstimator, TargetFusionParamete
 from estimators.tracking.metrics import rms
 from flightsim.environment import Environment
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
+from flightsim.foundation.operating_system import processors
 from flightsim.foundation.random_streams import RandomStreams
 from flightsim.payload import (
     CameraParameters,
@@ -51,7 +52,6 @@ from missions.pattern_search.flight import fly_pattern
 from missions.patterns.curve import Lap
 from missions.patterns.lissajous import Lissajous
 from missions.studies import Pool, Study, run_study
-from missions.studies.pool import processors
 from missions.studies.study import run_of
 from missions.vehicle.concurrency import run_concurrently
 from missions.vehicle.connection import Connection

@@ -2,6 +2,7 @@
 
 import os
 import shutil
+import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -38,11 +39,16 @@ class FirmwareBuild:
         """The build that a text names: "px4=FOLDER", "ardupilot=FILE", "px4" or "ardupilot".
 
         Raises:
-            ValueError: it is none of them; the message lists the forms.
+            ValueError: it is none of them; the message lists the forms. On Windows, always.
         """
         firmware, equals, path = text.partition("=")
         if firmware not in FIRMWARES or (equals and not path):
             raise ValueError(f"firmware {text!r} is not accepted; give {FORMS}")
+        if sys.platform == "win32":
+            raise ValueError(
+                f"firmware {text!r} is not possible on Windows; start the firmware's SITL in WSL "
+                "or elsewhere, and connect to it"
+            )
         return cls(firmware, Path(path) if path else None)
 
     def __str__(self) -> str:
@@ -75,7 +81,7 @@ def _px4_folder(path: Path, source: str) -> Path:
 
 
 def _ardupilot_program(path: Path, source: str) -> Path:
-    found = shutil.which(path)
+    found: str | None = shutil.which(path)
     if found is None:
         raise ValueError(f"{source}: {path} is not a program; give ArduPilot's SITL binary")
     return Path(found).resolve()

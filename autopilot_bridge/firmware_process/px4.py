@@ -13,6 +13,7 @@ import math
 import os
 import re
 import socket
+import sys
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -329,6 +330,8 @@ def _free_instance() -> tuple[int, socket.socket]:
 
 def _runs(instance: int) -> bool:
     """Whether a PX4 of this machine has the instance: its server takes commands at a socket of its number."""
+    if sys.platform == "win32":
+        return False
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
         try:
             probe.connect(f"{tempfile.gettempdir()}/px4-sock-{instance}")

@@ -6,6 +6,7 @@ udppeer:14580,127.0.0.1:14540  own UDP port and a partner to send to from the st
 tcp:127.0.0.1:5760             connect by TCP (also tcpout:, tcp://, tcpout://)
 tcpin:127.0.0.1:5760           listen on TCP (also tcpin://)
 serial:/dev/ttyACM0:115200     serial port and baud rate (also serial://, and /dev/ttyACM0,115200)
+COM3,57600                     the same on Windows (also serial:COM3:57600, and \\\\.\\COM12,57600)
 ./ttyV0,57600                  the same of a device anywhere, such as a link to a pseudo-terminal: DEVICE,BAUD
 flight.tlog                    telemetry log, replayed
 """
@@ -122,7 +123,7 @@ _CLIENTS: Final[dict[str, type[UdpClient | TcpClient]]] = {
     "tcpout": TcpClient,
 }
 _SCHEME: Final = re.compile(r"([A-Za-z]+):(//)?(.*)", re.DOTALL)
-_DEVICE: Final = re.compile(r"/dev/.+")
+_DEVICE: Final = re.compile(r"/dev/.+|(\\\\\.\\)?COM\d+(,.*)?", re.IGNORECASE)
 
 
 def parse_address(text: str, accepted: str = ACCEPTED_FORMS) -> Address:

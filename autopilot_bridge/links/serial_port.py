@@ -1,19 +1,17 @@
-"""Serial links (POSIX): USB, UART, and pseudo terminals."""
+"""Serial links: USB, UART, and pseudo-terminals."""
 
 import os
-import termios
+import sys
 from collections.abc import Callable
 from typing import Final
-
-import serial
 
 from autopilot_bridge.clock.pacing import wall_time_s
 from autopilot_bridge.errors import LinkError
 from autopilot_bridge.links.address import SerialPort
 from autopilot_bridge.links.link import MAX_READS, LinkCounters, PeerId, SendQueue
+from autopilot_bridge.links.serial_line import SerialLine, open_line
 
 REOPEN_INTERVAL_S: Final = 1.0
-_READ_SIZE: Final = 4096
 _BITS_PER_BYTE: Final = 10  # start bit, eight data bits, stop bit
 _BACKLOG_S: Final = 0.5  # older data are dropped
 _LEAST_BACKLOG_BYTES: Final = 4096  # enough for the answers on a slow line
@@ -42,8 +40,8 @@ class SerialLink:
             self.counters, max(_LEAST_BACKLOG_BYTES, round(_BACKLOG_S * self.bytes_per_s))
         )
         try:
-            self._port: serial.Serial | None = self._open()
-        except (serial.SerialException, OSError, ValueError, termios.error) as error:
+            self._line: SerialLine | None = self._open()
+        except (OSError, ValueError) as error:
             raise _open_error(address, error) from error
 
     @property
@@ -54,12 +52,12 @@ class SerialLink:
     @property
     def connected(self) -> bool:
         """The device is present."""
-        return self._port is not None
+        return self._line is not None
 
     @property
     def peers(self) -> tuple[PeerId, ...]:
         """The device, while it is present."""
-        return (self._peer,) if self._port is not None else ()
+        return (self._peer,) if self._line is not None else ()
 
     @property
     def congested(self) -> bool:
@@ -68,25 +66,25 @@ class SerialLink:
 
     def send(self, data: bytes, to: PeerId | None = None) -> None:
         """Send; the data are dropped while the device is not present."""
-        if self._port is None:
+        if self._line is None:
             self.counters.dropped += 1
             self.counters.bytes_dropped += len(data)
             return
         try:
-            self._queue.send(data, self._write)
+            self._queue.send(data, self._line.write)
         except OSError:
             self._unplugged()
 
     def receive(self) -> list[tuple[PeerId, bytes]]:
         """All received bytes."""
         received: list[tuple[PeerId, bytes]] = []
-        if self._closed or (self._port is None and not self._reopen()):
+        if self._closed or (self._line is None and not self._reopen()):
             return received
-        assert self._port is not None
+        assert self._line is not None
         try:
-            self._queue.flush(self._write)
+            self._queue.flush(self._line.write)
             for _ in range(MAX_READS):
-                data = os.read(self._port.fileno(), _READ_SIZE)
+                data = self._line.read()
                 if not data:  # hung up
                     self._unplugged()
                     break
@@ -100,42 +98,29 @@ class SerialLink:
         return received
 
     def filenos(self) -> tuple[int, ...]:
-        """The device, while it is present."""
-        return () if self._port is None else (self._port.fileno(),)
+        """The device, while it is present and can be watched."""
+        return () if self._line is None else self._line.filenos()
 
     def close(self) -> None:
         """Close the device permanently."""
         self._closed = True
-        if self._port is not None:
+        if self._line is not None:
             self._queue.clear()
-            self._port.close()
-            self._port = None
+            self._line.close()
+            self._line = None
 
-    def _open(self) -> serial.Serial:
-        # `exclusive`: a second program on the same port would take part of the bytes.
-        opened = serial.Serial(
-            self._address.device, self._address.baud, timeout=0, write_timeout=0, exclusive=True
-        )
-        # With pyserial's VMIN = 0, read() returns the same for "no data" and "disconnected".
-        attributes = termios.tcgetattr(opened.fileno())
-        attributes[6][termios.VMIN] = 1
-        termios.tcsetattr(opened.fileno(), termios.TCSANOW, attributes)
-        os.set_blocking(opened.fileno(), False)
+    def _open(self) -> SerialLine:
+        opened = open_line(self._address)
         self.counters.connects += 1
         return opened
 
-    def _write(self, data: bytes) -> int:
-        # Not pyserial's write: it loops without a pause while the line accepts nothing.
-        assert self._port is not None
-        return os.write(self._port.fileno(), data)
-
     def _unplugged(self) -> None:
-        assert self._port is not None
+        assert self._line is not None
         self.counters.errors += 1
         self.counters.disconnects += 1
         self._queue.clear()
-        self._port.close()
-        self._port = None
+        self._line.close()
+        self._line = None
         self._last_attempt_s = self._monotonic()
 
     def _reopen(self) -> bool:
@@ -143,8 +128,8 @@ class SerialLink:
             return False
         self._last_attempt_s = self._monotonic()
         try:
-            self._port = self._open()
-        except (serial.SerialException, OSError, ValueError, termios.error):
+            self._line = self._open()
+        except (OSError, ValueError):
             self.counters.errors += 1
             return False
         return True
@@ -152,10 +137,14 @@ class SerialLink:
 
 def _open_error(address: SerialPort, error: Exception) -> LinkError:
     text = str(error)
-    if "lock" in text:
+    if sys.platform == "win32":  # pyserial's text has the error's name, and COM3 is no path
+        in_use, missing = "PermissionError" in text, "FileNotFoundError" in text
+    else:
+        in_use, missing = "lock" in text, not os.path.exists(address.device)
+    if in_use:
         advice = "another program has it open: stop that program"
-    elif not os.path.exists(address.device):
-        advice = "there is no such device: check the cable, `ls /dev/tty*` lists the devices"
+    elif missing:
+        advice = "there is no such device: check the cable, `python -m serial.tools.list_ports` lists them"
     elif isinstance(error, OSError) and error.errno == 13:
         advice = "not permitted: add yourself to the group that owns it (often 'dialout')"
     else:

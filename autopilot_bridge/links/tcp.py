@@ -1,7 +1,7 @@
 """TCP links."""
 
-import select
 import socket
+import sys
 from collections.abc import Callable
 from typing import Final
 
@@ -9,6 +9,7 @@ from autopilot_bridge.clock.pacing import wall_time_s
 from autopilot_bridge.errors import LinkError
 from autopilot_bridge.links.address import TcpClient, TcpServer
 from autopilot_bridge.links.link import MAX_READS, READ_SIZE, LinkCounters, PeerId, SendQueue, open_error
+from autopilot_bridge.links.readiness import writable
 
 CONNECT_TIMEOUT_S: Final = 5.0
 RECONNECT_INTERVAL_S: Final = 1.0
@@ -225,9 +226,7 @@ class TcpClientLink:
             self._connecting = socket.socket(self._family, socket.SOCK_STREAM)
             self._connecting.setblocking(False)
             self._connecting.connect_ex(self._remote)
-        poll = select.poll()
-        poll.register(self._connecting, select.POLLOUT)
-        if not poll.poll(0):
+        if not writable(self._connecting.fileno()):
             if self._monotonic() - self._last_attempt_s > CONNECT_TIMEOUT_S:
                 self._give_up_attempt()
             return False
@@ -321,7 +320,10 @@ def _listen(address: TcpServer) -> socket.socket:
         raise _refused(str(address), error) from error
     listener = socket.socket(family, kind)
     listener.setblocking(False)
-    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    if sys.platform == "win32":  # there SO_REUSEADDR would let a second server take the port
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_EXCLUSIVEADDRUSE, 1)
+    else:
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         listener.bind(target)
         listener.listen(_BACKLOG)

@@ -2,7 +2,6 @@
 
 import contextlib
 import gc
-import select
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -10,6 +9,7 @@ from typing import Final
 from autopilot_bridge.clock import RealTimeClock
 from autopilot_bridge.firmware.simulator import Port, default_ports
 from autopilot_bridge.links import Link, open_link, reach_of
+from autopilot_bridge.links.readiness import readable
 from autopilot_bridge.sitl.containment import FailureReport, VehicleFailure
 from autopilot_bridge.sitl.sitl import Sitl
 from autopilot_bridge.sitl.vehicle import SitlVehicle
@@ -149,8 +149,7 @@ class SitlServer:
         while not link.peers:
             if stopped():
                 return False
-            with contextlib.suppress(InterruptedError):
-                select.select(link.filenos(), (), (), _WAIT_S)
+            readable(link.filenos(), _WAIT_S)
             self.sitl.poll()
         return True
 
@@ -199,12 +198,5 @@ class SitlServer:
             left_s = deadline_s - self._monotonic()
             if left_s <= 0.0:
                 return
-            poll = select.poll()
-            for number in self.sitl.filenos():
-                poll.register(number, select.POLLIN)
-            try:
-                ready = poll.poll(left_s * 1e3)
-            except InterruptedError:
-                return
-            if ready:
+            if readable(self.sitl.filenos(), left_s):
                 self.sitl.poll()

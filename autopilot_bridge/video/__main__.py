@@ -5,7 +5,6 @@ It ends when the process that started it ends, for whatever reason.
 
 import asyncio
 import contextlib
-import os
 import signal
 import socket
 import sys
@@ -15,6 +14,7 @@ import cv2
 from autopilot_bridge.video.messages import setup_from_json, unpack
 from autopilot_bridge.video.rtsp_server import RtspServer
 from autopilot_bridge.video.studio import Studio, open_line
+from flightsim.foundation.operating_system import END_SIGNALS, lower_priority
 
 
 async def _main(control: int, listen: int) -> None:
@@ -34,8 +34,9 @@ async def _main(control: int, listen: int) -> None:
 
 
 if __name__ == "__main__":
-    for ending in (signal.SIGINT, signal.SIGHUP):  # sent by a terminal; the vehicles' process handles them
-        signal.signal(ending, signal.SIG_IGN)
-    os.nice(5)
+    for ending in END_SIGNALS:  # sent by a terminal; the vehicles' process handles them
+        if ending != signal.SIGTERM:
+            signal.signal(ending, signal.SIG_IGN)
+    lower_priority()
     cv2.setNumThreads(1)
     asyncio.run(_main(int(sys.argv[1]), int(sys.argv[2])))

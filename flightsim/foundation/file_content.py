@@ -13,6 +13,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO, Final
 
+from flightsim.foundation.operating_system import READ_AT_ONCE
+
 __all__ = [
     "HEAD_BYTES",
     "TEXT_BYTES",
@@ -103,8 +105,7 @@ def open_file(
             than any reader here reads.
     """
     try:
-        # a pipe without a writer would keep a blocking open waiting; fstat rules it out afterwards
-        descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+        descriptor = os.open(path, READ_AT_ONCE)  # fstat rules out pipes afterwards
     except OSError as error:
         raise FileError(path, _kind_of(path) or error.strerror or str(error)) from None
     except ValueError as error:  # a null character in the path

@@ -17,8 +17,7 @@ from enum import Enum
 from functools import cache, partial
 from importlib import import_module
 from pathlib import Path
-from threading import Event
-from typing import Any, BinaryIO, Final, Literal, TypeVar, overload
+from typing import TYPE_CHECKING, Any, Final, Literal, TypeVar, overload
 
 import numba
 import numpy as np
@@ -32,10 +31,8 @@ try:  # Numba promises nothing of these; tests/flightsim/foundation/test_kernels
 except ImportError:  # then Numba's own cache serves, and kernels are called with all their arguments
     dumps = None
 
-try:
-    import fcntl
-except ImportError:  # not on Windows: there every process compiles
-    fcntl = None  # type: ignore[assignment]
+if TYPE_CHECKING:
+    from filelock import BaseFileLock
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 _ErrorModel = Literal["python", "numpy"]
@@ -44,7 +41,7 @@ _PLAIN: Final = (bool, int, float, complex, str, bytes, type(None), slice, range
 _STAMP_DIGITS: Final = 16
 _BLAS: Final = "scipy.linalg.cython_blas"
 _TURN_CHECK_S: Final = 0.02
-_TURN_CHECKS: Final = 3000  # a process that was stopped while it compiles must not stop all others
+_TURN_S: Final = 60.0  # a process that was stopped while it compiles must not stop all others
 
 
 @overload
@@ -342,7 +339,7 @@ class _CacheFile:
         self._base = base
         self._function = function
         self._variant = variant
-        self._turn: BinaryIO | None = None
+        self._turn: BaseFileLock | None = None
 
     def beside(self, name: str, function: Callable[..., Any], variant: str) -> "_CacheFile":
         """The file of a function that calls the kernel, in one of several variants with separate files."""
@@ -369,21 +366,17 @@ class _CacheFile:
 
     def begin_turn(self) -> bool:
         """Wait until no other process compiles the kernel, for a limited time. False: there was no wait."""
-        if fcntl is None or self._turn is not None:  # a kernel that calls itself with other types
+        if self._turn is not None:  # a kernel that calls itself with other types
             return False
-        with suppress(OSError):  # a folder that is not writable, or a file system without locks
-            pause = Event()
-            turn = open(self._turn_path, "wb")  # noqa: SIM115  # until the end of the turn
-            for _ in range(_TURN_CHECKS):
-                try:
-                    fcntl.flock(turn, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                except BlockingIOError:
-                    pause.wait(_TURN_CHECK_S)
-                else:
-                    self._turn = turn
-                    return True
-            turn.close()
-        return False
+        from filelock import FileLock  # takes 0.1 s, and most processes compile nothing
+
+        turn = FileLock(self._turn_path)
+        # a folder that is not writable, a file system without locks, no turn in this time, or a turn of this
+        # thread for another kernel of the same name
+        with suppress(OSError, RuntimeError):
+            turn.acquire(timeout=_TURN_S, poll_interval=_TURN_CHECK_S)
+            self._turn = turn
+        return self._turn is not None
 
     def end_turn(self) -> None:
         """Let another process compile; nothing if this one did not."""
@@ -391,7 +384,7 @@ class _CacheFile:
         if turn is not None:
             with suppress(OSError):
                 self._turn_path.unlink()
-            turn.close()
+            turn.release()
 
     @property
     def _turn_path(self) -> Path:

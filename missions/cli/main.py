@@ -8,6 +8,7 @@ import contextlib
 import errno
 import gc
 import importlib
+import io
 import os
 import sys
 from typing import Final
@@ -120,12 +121,16 @@ def run_command_line(arguments: list[str] | None = None) -> int:
 
 
 def _open_closed_streams() -> None:
-    """Replace standard streams that were closed (`2>&-`) by the null device.
+    """Replace standard streams that were closed (`2>&-`) by the null device; let a console without UTF-8 show
+    a question mark for what it does not have.
 
     Output to them is discarded, as the user requested, and no file or socket gets the number of one of them.
     """
     for number, name in enumerate(("stdin", "stdout", "stderr")):
-        if getattr(sys, name) is not None:
+        stream = getattr(sys, name)
+        if stream is not None:
+            if number and isinstance(stream, io.TextIOWrapper):
+                stream.reconfigure(errors="replace")
             continue
         null = os.open(os.devnull, os.O_RDWR)
         if null != number:

@@ -5,7 +5,6 @@ processed it: a replay of that log gives the same estimates, bit for bit.
 """
 
 import asyncio
-import signal
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -29,7 +28,7 @@ from missions.estimation.report import EstimationResult, ReportRequest, report
 from missions.estimation.tap import TEAM_SYSTEM, EstimatorTap, Publisher
 from missions.flown.records import FlightRecorder
 from missions.flown.run_folder import LOG_NAME, create_run_folder
-from missions.process.ending import end_signals
+from missions.process.ending import StopOnSignals
 from missions.vehicle.connection import Connection
 from missions.vehicle.signing import client_signing
 
@@ -266,10 +265,10 @@ def estimate(
         log = TlogWriter(folder / LOG_NAME)
         recorder = FlightRecorder(log, epoch_us=None, unix_time_us=unix_time_us)
         try:
-            loop = asyncio.new_event_loop()
+            loop = asyncio.SelectorEventLoop()
             process = _Process(request, link, fleet, recorder, folder / LOG_NAME)
-            _end_on_signals(loop, process.stop)
-            run(process.run(on_progress), loop)
+            with StopOnSignals(loop, process.stop):
+                run(process.run(on_progress), loop)
         finally:
             recorder.close()
     finally:
@@ -292,9 +291,3 @@ def estimate(
             more={"connect": request.connect, "link": process.figures()},
         )
     )
-
-
-def _end_on_signals(loop: asyncio.AbstractEventLoop, stop: Callable[[], None]) -> None:
-    """Make Ctrl-C, SIGTERM and SIGHUP end the run normally, until the loop is closed."""
-    for number in end_signals(signal.SIGINT, signal.SIGTERM):
-        loop.add_signal_handler(number, stop)

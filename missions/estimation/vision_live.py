@@ -1,7 +1,6 @@
 """The vision process over a live stream: the messages of the pictures are sent on the vehicle's link."""
 
 import asyncio
-import signal
 from contextlib import suppress
 from typing import Any, Final, Generic
 
@@ -28,7 +27,7 @@ from missions.estimation.vision_request import (
 from missions.flown.camera_film import CameraFilm
 from missions.flown.records import FlightRecorder
 from missions.flown.run_folder import LOG_NAME, create_run_folder
-from missions.process.ending import end_signals
+from missions.process.ending import StopOnSignals
 from missions.vehicle.connection import Connection
 from missions.vehicle.signing import client_signing
 
@@ -53,11 +52,10 @@ def next_to_link(
         recorder = FlightRecorder(log, epoch_us=None, unix_time_us=unix_time_us)
         film = CameraFilm(folder / _FILM_NAME, pictures.camera) if request.film else None
         try:
-            loop = asyncio.new_event_loop()
+            loop = asyncio.SelectorEventLoop()
             process = _Live(request, link, pictures, recorder, film)
-            for number in end_signals(signal.SIGINT, signal.SIGTERM):
-                loop.add_signal_handler(number, process.stop)
-            run(process.run(on_progress), loop)
+            with StopOnSignals(loop, process.stop):
+                run(process.run(on_progress), loop)
             if film is not None:
                 process.close(film)
         finally:

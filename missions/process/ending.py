@@ -1,8 +1,8 @@
 """The signals that end a command: from Ctrl-C, `kill`, a service manager, or a closed terminal.
 
-`kill`, `timeout` and service managers send SIGTERM; a closed terminal sends SIGHUP. By default both end a
-process immediately, with its vehicles in the air. Here they act like Ctrl-C: a process that receives one
-leaves its vehicles safe before it ends.
+`kill`, `timeout` and service managers send SIGTERM; a closed terminal sends SIGHUP; on Windows Ctrl-Break and
+a closed console send SIGBREAK. By default they end a process immediately, with its vehicles in the air. Here
+they act like Ctrl-C: a process that receives one leaves its vehicles safe before it ends.
 """
 
 import asyncio
@@ -19,7 +19,7 @@ from typing import Any, ClassVar, Final, Self, TypeVar
 
 from autopilot_bridge.clock import run
 from autopilot_bridge.clock.pacing import wall_time_s
-from missions.process.supervision import END_SIGNALS
+from flightsim.foundation.operating_system import END_SIGNALS
 
 T = TypeVar("T")
 
@@ -30,7 +30,7 @@ count as one.
 
 
 def end_signals(*always: signal.Signals) -> tuple[signal.Signals, ...]:
-    """SIGINT, SIGTERM and SIGHUP, as far as this process should handle them now.
+    """The `END_SIGNALS` that this process should handle now.
 
     Signals that are ignored (`nohup`, a background job) or that already have another handler are left out,
     except those in `always`. Outside the main thread all are left out, because only the main thread can
@@ -189,6 +189,27 @@ class EndingSignals(EndSignalHandler):
 
 def _raise(error: BaseException) -> None:
     raise error
+
+
+class StopOnSignals(EndSignalHandler):
+    """A context in which such a signal makes a loop call a function, which ends its work normally.
+
+    Unlike `loop.add_signal_handler`, it works on Windows too.
+
+    Args:
+        loop: is woken by a signal.
+        stop: called by the loop.
+    """
+
+    always = (signal.SIGINT, signal.SIGTERM)
+
+    def __init__(self, loop: asyncio.AbstractEventLoop, stop: Callable[[], None]) -> None:
+        super().__init__()
+        self._loop, self._stop = loop, stop
+
+    def _on_signal(self, number: int, frame: FrameType | None) -> None:
+        if not self._loop.is_closed():
+            self._loop.call_soon_threadsafe(self._stop)
 
 
 class EndRequests(EndSignalHandler):

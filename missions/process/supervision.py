@@ -9,9 +9,9 @@ from collections.abc import Callable, Iterable
 from types import FrameType
 from typing import Final
 
+from flightsim.foundation.operating_system import END_SIGNALS
+
 FAILED: Final = 1
-END_SIGNALS: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-"""The signals that end a command: Ctrl-C, `kill` and service managers, a closed terminal."""
 _KILLED: Final = 128
 """Added to the signal's number: the exit code that shells report for a command that a signal ended."""
 
@@ -19,13 +19,16 @@ _KILLED: Final = 128
 def supervised(command: Callable[[], int], *, crashed: str) -> int:
     """Run a command in a child process and return its exit code.
 
-    Call it before threads are started and libraries are loaded, because the process is forked.
+    Call it before threads are started and libraries are loaded, because the process is forked. On Windows,
+    which has no fork, the command runs in this process, and a crash is not put in words.
 
     Args:
         command: returns its exit code.
         crashed: text printed on stderr, before the signal's name, when a signal of a crash ended the process;
             the exit code is then 1.
     """
+    if sys.platform == "win32":
+        return command()
     _flush()
     # A signal between the fork and the installation of the handler must not leave the child without its
     # parent.
@@ -77,6 +80,8 @@ def _wait(child: int, mask: Iterable[int]) -> int:
         with contextlib.suppress(ProcessLookupError):  # it has just ended by itself
             os.kill(child, number)
 
+    if sys.platform == "win32":
+        raise NotImplementedError
     before = {number: signal.signal(number, pass_on) for number in END_SIGNALS}
     if sys.stdin is not None and sys.stdin.isatty():
         signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -139,7 +139,7 @@ class VehicleOpener:
                 link.close()
 
         return Stage(
-            loop=asyncio.new_event_loop(),
+            loop=asyncio.SelectorEventLoop(),  # watches sockets on every system
             links=links,
             clocks=list(clocks),
             epoch_us=None,

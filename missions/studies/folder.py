@@ -4,7 +4,6 @@ It may be on any file system of `pyarrow.fs`. Every file is whole or absent: loc
 they are complete, and objects of a store appear when they are complete.
 """
 
-import fcntl
 import io
 import json
 import os
@@ -16,6 +15,7 @@ from typing import Any, Final, Self
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
+from filelock import BaseFileLock, FileLock, Timeout
 from pyarrow import fs
 
 from missions.errors import MissionError, PlanError
@@ -50,7 +50,7 @@ class StudyFolder:
     def __init__(self, system: fs.FileSystem, path: str, text: str) -> None:
         self._fs, self._path, self.text = system, path.rstrip("/"), text
         self._local = Path(path) if isinstance(system, fs.LocalFileSystem) else None
-        self._lock: int | None = None
+        self._lock: BaseFileLock | None = None
 
     @classmethod
     def created(cls, out: Path | str | None, name: str) -> Self:
@@ -104,11 +104,10 @@ class StudyFolder:
             PlanError: another process computes this study now.
         """
         if self._local is not None:
-            self._lock = os.open(self._local / _LOCK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+            self._lock = FileLock(self._local / _LOCK)
             try:
-                fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError as error:
-                os.close(self._lock)
+                self._lock.acquire(blocking=False)
+            except Timeout as error:
                 raise PlanError(
                     f"another process computes the study in {self.text} now; wait for its end"
                 ) from error
@@ -118,7 +117,7 @@ class StudyFolder:
         if self._lock is not None and self._local is not None:
             with suppress(OSError):
                 (self._local / _LOCK).unlink()
-            os.close(self._lock)
+            self._lock.release()
             self._lock = None
 
     def has(self, name: str) -> bool:

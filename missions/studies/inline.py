@@ -1,10 +1,12 @@
 """Trials in this process, one after the other."""
 
 import signal
+import sys
 import threading
 from collections.abc import Iterator, Sequence
 from types import FrameType
 
+from missions.errors import PlanError
 from missions.studies.crew import timed_out
 from missions.studies.job import Job
 from missions.studies.rows import TrialResult
@@ -19,14 +21,23 @@ class Inline:
     """The engine that runs trials in this process.
 
     A time limit is kept by SIGALRM, in the main thread: it interrupts Python code. A trial that does not
-    return from compiled code is not interrupted; a pool of one worker terminates it.
+    return from compiled code is not interrupted; a pool of one worker terminates it. Windows has no SIGALRM.
     """
 
     name = "inline"
     workers = 1
 
     def results(self, job: Job, indices: Sequence[int]) -> Iterator[TrialResult | None]:
-        """Run trials in their order."""
+        """Run trials in their order.
+
+        Raises:
+            PlanError: a time limit, on Windows.
+        """
+        if sys.platform == "win32" and job.time_limit_s is not None:
+            raise PlanError(
+                f"`time_limit_s` {job.time_limit_s:g} is not possible in this process on Windows; "
+                "a `Pool` of one worker keeps it"
+            )
         runner = TrialRunner(job.trials, job.keep_logs)
         try:
             for index in indices:
@@ -43,7 +54,7 @@ class _TimeUp(KeyboardInterrupt):
 
 
 def _limited(runner: TrialRunner, index: int, limit_s: float) -> TrialResult:
-    if threading.current_thread() is not threading.main_thread():
+    if sys.platform == "win32" or threading.current_thread() is not threading.main_thread():
         return runner.run(index)
     up = False
 

@@ -11,24 +11,17 @@ from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import Any, Final
 
+from flightsim.foundation.operating_system import processors
 from missions.errors import PlanError
 from missions.studies.crew import Broken, Crew, Died, Event, Ready, Worker, supervise
 from missions.studies.job import Job, PackedJob
 from missions.studies.rows import TrialResult
 from missions.studies.trial_runner import error_text
 
-__all__ = ["Pool", "processors"]
+__all__ = ["Pool"]
 
 _READY: Final = "ready"
 _END_S: Final = 5.0
-
-
-def processors() -> int:
-    """Number of processors that this process may use."""
-    try:
-        return len(os.sched_getaffinity(0))
-    except AttributeError:  # not available on every system
-        return os.cpu_count() or 1
 
 
 class Pool:

@@ -3,6 +3,7 @@
 import asyncio
 import os
 import sys
+import threading
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext, suppress
 from typing import Final
@@ -51,6 +52,8 @@ async def ask(question: str) -> str:
 
 async def _line(terminal: int) -> str:
     loop = asyncio.get_running_loop()
+    if sys.platform == "win32":  # a console can't be watched there
+        return await _line_by_thread(loop)
     typed = bytearray()
     done: asyncio.Future[None] = loop.create_future()
 
@@ -69,6 +72,23 @@ async def _line(terminal: int) -> str:
     finally:
         loop.remove_reader(terminal)
     return typed.decode(errors="replace")
+
+
+async def _line_by_thread(loop: asyncio.AbstractEventLoop) -> str:
+    """A line of standard input that a thread reads; it doesn't keep the process from ending."""
+    typed: asyncio.Future[str] = loop.create_future()
+
+    def take(line: str) -> None:
+        if not typed.done():
+            typed.set_result(line)
+
+    def read() -> None:
+        line = sys.stdin.readline()
+        with suppress(RuntimeError):  # the loop was closed: the question is no longer open
+            loop.call_soon_threadsafe(take, line)
+
+    threading.Thread(target=read, daemon=True).start()
+    return await typed
 
 
 def leaves_this_machine(connections: Sequence[str]) -> bool:

@@ -1,14 +1,18 @@
 """What a SITL keeps: the vehicles' memory cards, and reports of data that could not be written."""
 
+import sys
 import tempfile
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Final
 
 from autopilot_bridge.sitl import VehicleFailure
 from autopilot_bridge.storage import FOLDER_QUOTA, TEMPORARY_QUOTA
-from autopilot_bridge.storage.folder import FolderStore
 from autopilot_bridge.storage.memory import MemoryCard
 from missions.cli.options import report
+
+if sys.platform != "win32":
+    from autopilot_bridge.storage.folder import FolderStore
 
 NONE: Final = "none"
 
@@ -28,32 +32,35 @@ class VehicleCards:
     """
 
     def __init__(self, storage: str | None, count: int) -> None:
-        self._stores: list[FolderStore] = []
-        self._temporary: tempfile.TemporaryDirectory[str] | None = None
-        if storage == NONE:
-            self.cards: list[MemoryCard] = [MemoryCard() for _ in range(count)]
-            return
-        if storage is None:
-            self._temporary = tempfile.TemporaryDirectory(prefix="flightstack-sitl-")
-        folder = Path(self._temporary.name if self._temporary is not None else str(storage))
-        try:
-            for number in range(1, count + 1):
-                quota = FOLDER_QUOTA if self._temporary is None else TEMPORARY_QUOTA
-                self._stores.append(FolderStore(folder / f"vehicle{number}", quota))
-        except OSError as error:
-            self.close()
+        self.cards: list[MemoryCard] = []
+        self._at_end = ExitStack()
+        if sys.platform == "win32" and storage not in (None, NONE):
             raise ValueError(
-                f"--storage {storage}: {error.filename or folder} {error.strerror}; "
-                f"accepted: a folder of one's own, or {NONE}"
-            ) from error
-        self.cards = [MemoryCard(files=store, logs=True) for store in self._stores]
+                f"--storage {storage}: a folder as a memory card is not possible on Windows; accepted: {NONE}"
+            )
+        if sys.platform == "win32" or storage == NONE:
+            self.cards.extend(MemoryCard() for _ in range(count))
+        else:
+            folder, quota = Path(storage or ""), FOLDER_QUOTA
+            if storage is None:
+                temporary = tempfile.TemporaryDirectory(prefix="flightstack-sitl-")
+                self._at_end.callback(temporary.cleanup)
+                folder, quota = Path(temporary.name), TEMPORARY_QUOTA
+            try:
+                for number in range(1, count + 1):
+                    store = FolderStore(folder / f"vehicle{number}", quota)
+                    self._at_end.callback(store.close)
+                    self.cards.append(MemoryCard(files=store, logs=True))
+            except OSError as error:
+                self.close()
+                raise ValueError(
+                    f"--storage {storage}: {error.filename or folder} {error.strerror}; "
+                    f"accepted: a folder of one's own, or {NONE}"
+                ) from error
 
     def close(self) -> None:
         """Release the folders; a temporary one is removed."""
-        for store in self._stores:
-            store.close()
-        if self._temporary is not None:
-            self._temporary.cleanup()
+        self._at_end.close()
 
 
 class Losses:

@@ -1,5 +1,6 @@
 """Video and pictures of the cameras of `flightstack sitl`."""
 
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -29,6 +30,11 @@ def start_video(
             raise ValueError(f"{option} is for cameras; add --camera")
         return None
     if video == "off" and pictures is None:
+        return None
+    if sys.platform == "win32":
+        if video is not None or pictures is not None:
+            raise ValueError("video and pictures are not possible on Windows; accepted: --video off")
+        click.echo("no video: it is not possible on Windows", err=True)
         return None
 
     if video == "off":

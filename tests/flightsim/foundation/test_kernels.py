@@ -205,7 +205,7 @@ def test_code_is_kept_until_a_constant_of_another_module_changes(package: Packag
 def test_a_process_that_stops_while_it_compiles_does_not_stop_the_others(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr(kernels, "_TURN_CHECKS", 2)
+    monkeypatch.setattr(kernels, "_TURN_S", 0.05)
     one, other = (kernels._CacheFile(tmp_path, "name", kernels.kernel) for _ in range(2))
     assert one.begin_turn()
     assert not one.begin_turn()  # a kernel that calls itself
