@@ -8,12 +8,15 @@ ESTIMATOR_COMPONENTS: Final = range(191, 195)
 
 
 class ExportFormat(StrEnum):
-    """The formats of other tools that messages of logs are written in."""
+    """The formats of other tools that logs are written in: of messages, and of places on a map."""
 
     CSV = "csv"
     PARQUET = "parquet"
     NPZ = "npz"
     MCAP = "mcap"
+    KML = "kml"
+    GPX = "gpx"
+    GEOJSON = "geojson"
 
 
 class Against(StrEnum):

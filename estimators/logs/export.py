@@ -17,7 +17,9 @@ from estimators.logs.units import to_si
 from estimators.messages import SOURCE_FIELDS
 from estimators.user_choices import ExportFormat
 
-FORMATS: Final = tuple(map(str, ExportFormat))
+FORMATS: Final = tuple(
+    map(str, (ExportFormat.CSV, ExportFormat.PARQUET, ExportFormat.NPZ, ExportFormat.MCAP))
+)
 """csv, parquet: a folder with a file for each message and component; npz, mcap: one file."""
 
 

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.survey.map_places import WGS84, grid_degrees, library
+from estimators.extras import library
+from estimators.survey.map_places import WGS84, grid_degrees
 from flightsim.foundation.geodesy import GeodeticPosition
 
 __all__ = ["write_geotiff"]

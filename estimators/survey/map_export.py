@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimators.errors import EstimatorError
+from estimators.extras import library
 from estimators.logs.new_file import new_file
 from estimators.survey.geotiff import write_geotiff
-from estimators.survey.map_places import WGS84, grid_degrees, library
+from estimators.survey.map_places import WGS84, grid_degrees
 from flightsim.foundation.magnetic_map_file import MapContents
 
 __all__ = ["exported_map"]

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from scipy.interpolate import RegularGridInterpolator
 
 from estimators.errors import EstimatorError
-from estimators.survey.map_places import EXAMPLE, WGS84, ReferenceSystem, library
+from estimators.extras import library
+from estimators.survey.map_places import EXAMPLE, WGS84, ReferenceSystem
 from estimators.survey.map_values import LATITUDES, LONGITUDES, chosen
 from flightsim.foundation.geodesy import WGS84_A_M, longitude_near
 

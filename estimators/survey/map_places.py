@@ -1,17 +1,17 @@
-"""Coordinate reference systems of imported and exported maps, and the libraries of the extra `maps`."""
+"""Coordinate reference systems of imported and exported maps, WGS84 among them."""
 
-import importlib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from estimators.errors import EstimatorError
+from estimators.extras import library
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame, longitude_near
 
-__all__ = ["WGS84", "ReferenceSystem", "grid_degrees", "library", "transformed"]
+__all__ = ["WGS84", "ReferenceSystem", "grid_degrees", "transformed"]
 
 Array = NDArray[np.float64]
 
@@ -89,21 +89,3 @@ def grid_degrees(home: GeodeticPosition, north_m: Array, east_m: Array) -> tuple
     """Latitudes (rows,) and longitudes (columns,) of a map's grid lines, WGS84; longitudes may pass 180."""
     per_lat, per_lon = LocalFrame(home).metres_per_degree
     return home.lat_deg + north_m / per_lat, home.lon_deg + east_m / per_lon
-
-
-def library(name: str, path: Path) -> Any:
-    """A library of the extra `maps`.
-
-    Args:
-        name: of the module.
-        path: the file that needs it.
-
-    Raises:
-        EstimatorError: it is not installed.
-    """
-    try:
-        return importlib.import_module(name)
-    except ImportError:
-        raise EstimatorError(
-            f"{path} needs {name.partition('.')[0]}, which is not installed: pip install 'flightstack[maps]'"
-        ) from None

@@ -68,11 +68,11 @@ def info() -> None:
 @click.option(
     "--out",
     type=click.Path(path_type=Path),
-    help="Folder (csv, parquet: a file for each message) or file (npz, mcap). [default: beside the log]",
+    help="Folder (csv, parquet: a file for each message) or file. [default: beside the log]",
 )
 @body_in(_BODIES)
 def export() -> None:
-    """Write messages to other tools' formats: Parquet, CSV, NumPy, MCAP."""
+    """Write messages to other tools' formats, or tracks, areas and targets to maps (kml, gpx, geojson)."""
 
 
 @log.command(params=[*declared_options(CoverageOptions)])

@@ -11,6 +11,7 @@ import click
 from autopilot_bridge.errors import BridgeError
 from autopilot_bridge.links import open_link, parse_address
 from estimators.errors import EstimatorError, NothingThere
+from estimators.exports.map_files import MAP_FORMATS, export_map
 from estimators.logs import Log, open_log, report_of
 from estimators.logs.condition import Condition
 from estimators.logs.dialect import load_dialect
@@ -23,7 +24,7 @@ from missions.base.options import SeedOptions
 from missions.cli.bodies.log_text import report_lines
 from missions.cli.bodies.signing import key_from, warn_if_open
 from missions.cli.bodies.status_line import StatusLine
-from missions.cli.declared_options import specified
+from missions.cli.declared_options import chosen_names, specified
 from missions.cli.options import in_options
 from missions.errors import PlanError
 from missions.estimation.coverage import assess_coverage
@@ -89,6 +90,9 @@ def export(path: Path, dialect: str | None, si: bool, out: Path | None, **_decla
     """`flightstack log export`."""
     form = specified(ExportOptions).format
     opened = _open(path, dialect)
+    if form in MAP_FORMATS:
+        _export_map(opened, si, out, form)
+        return
     target = out or path.with_name(
         f"{path.stem}-{form}" if form in ("csv", "parquet") else f"{path.stem}.{form}"
     )
@@ -126,6 +130,23 @@ def coverage(
     for remark in made.remarks:
         click.echo(remark, err=True)
     click.echo(f"written: {', '.join(made.written)} in {made.folder}")
+
+
+def _export_map(log: Log, si: bool, out: Path | None, form: str) -> None:
+    """Write the tracks and places of a whole log."""
+    chosen = sorted(chosen_names(click.get_current_context()) & {"si", *LogSelection.__dataclass_fields__})
+    if chosen:
+        option = chosen[0].removesuffix("_s").replace("_", "-")
+        raise click.UsageError(
+            f"--format {form} has whole tracks and takes no --{option}; log cut makes a part"
+        )
+    target = out or log.path.with_suffix(f".{form}")
+    try:
+        counts = export_map(log, target, form)
+    except EstimatorError as error:
+        raise click.ClickException(in_options(error)) from error
+    words = ", ".join(f"{count} {kind}{'s' if count > 1 else ''}" for kind, count in counts.items())
+    click.echo(f"written: {target}: {words}")
 
 
 def cut(path: Path, out: Path, dialect: str | None, **_declared: Any) -> None:

@@ -1,0 +1,1 @@
+"""Files of logs for maps and for programs of other fields: KML, GPX, GeoJSON."""
