@@ -78,7 +78,7 @@ def _kml(places: Sequence[MapFeature], path: Path) -> bytes:
 
 
 def _by_schema(text: str) -> bytes:
-    """The KML of simplekml as its schema wants it: ids that are no numbers, the altitude mode of a track first."""
+    """KML of simplekml as its schema wants it: ids that are no numbers, altitude modes of tracks first."""
     for prefix, uri in _NAMESPACES.items():
         ElementTree.register_namespace(prefix, uri)
     root = ElementTree.fromstring(text)
