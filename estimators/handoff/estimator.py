@@ -174,7 +174,7 @@ class HandoffEstimator(Estimator[HandoffSettings]):
             return fused
         if self._tracks:
             if fused is Outcome.USED:
-                self._report_motion(time_us)
+                self._report_motion()
         else:
             self._receive_pending(time_us)
             if fused is Outcome.UPDATED:
@@ -337,10 +337,14 @@ class HandoffEstimator(Estimator[HandoffSettings]):
         )
         return Outcome.UPDATED
 
-    def _report_motion(self, time_us: int) -> None:
-        """The tracker has an inertial sample."""
-        sent_us, every_us = self._motion_sent_us, round(1e6 * self.parameters.motion_s)
-        if not self._state.moved or (sent_us is not None and 0 <= time_us - sent_us < every_us):
+    def _report_motion(self) -> None:
+        """Report the tracker's motion up to its newest inertial sample, when it is due. A pressure may be
+        older than that: PX4's SCALED_PRESSURE is by some 0.15 s.
+        """
+        time_us, sent_us = self._state.newest_us, self._motion_sent_us
+        if time_us is None or not self._state.moved:
+            return
+        if sent_us is not None and 0 <= time_us - sent_us < round(1e6 * self.parameters.motion_s):
             return
         self._motion_sent_us = time_us
         self._outbox.append(

@@ -19,11 +19,16 @@ from autopilot_bridge.mavlink.handoff_messages import (
     track_report_messages,
 )
 from autopilot_bridge.mavlink.moving_points import MovingPoints, moving_points_messages
-from autopilot_bridge.mavlink.vehicle_motion import VEHICLE_MOTION_PAYLOAD, motion_message
+from autopilot_bridge.mavlink.vehicle_motion import (
+    VEHICLE_MOTION_PAYLOAD,
+    motion_message,
+    read_motion_payload,
+)
 from estimators.handoff import HandoffEstimator, HandoffSettings
 from estimators.handoff.designation import Designation
 from estimators.handoff.scans import ScanAssembler
 from estimators.interface import Outcome
+from estimators.messages import read_message
 from estimators.runner import Runner
 from tests.estimators.handoff.scenes import APART, HANDOFF, TRACKER, Scene
 
@@ -71,6 +76,28 @@ def test_scans_are_placed_when_the_aircraft_have_not_booted_together():
     for system in (HANDOFF, TRACKER):
         sight = scene.estimator(system).sight
         assert sight.tracks.places and sight.counts["unplaced"] <= 2, (system, sight.counts)
+
+
+def test_an_old_pressure_makes_no_report_of_the_motion():
+    """PX4's SCALED_PRESSURE is by 0.14 s older than its newest inertial sample."""
+    times_us = []
+
+    class Pressed(Scene):
+        def look(self, time_us, system, aircraft):
+            old = dialect.MAVLink_scaled_pressure_message(max(0, time_us // 1000 - 140), 1000.0, 3.5, 2000)
+            self.say(old, system)
+            super().look(time_us, system, aircraft)
+
+    def link(now_us, to, frame):
+        message = read_message(frame)
+        if message.payload_type == VEHICLE_MOTION_PAYLOAD:
+            fields = message.payload_type, message.payload_length, message.payload
+            times_us.append(read_motion_payload(*fields).time_us)
+        return []
+
+    Pressed(link=link).fly(4.0)
+    steps_us = np.diff(times_us)
+    assert len(times_us) > 20 and steps_us.min() >= 99_000, steps_us
 
 
 def encoded(message, system, component=191):
