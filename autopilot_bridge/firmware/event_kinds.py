@@ -11,7 +11,7 @@ from typing import Final, NamedTuple
 
 from autopilot_bridge.firmware.texts import Severity
 from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
-from autopilot_bridge.mavlink.event_messages import event_sub_id
+from autopilot_bridge.mavlink.event_ids import event_sub_id
 
 ARGUMENT_BYTES: Final = 40
 _CODES: Final[Mapping[str, str]] = {

@@ -13,7 +13,7 @@ from typing import Final
 
 from autopilot_bridge.errors import MessageError
 from autopilot_bridge.mavlink import dialect
-from autopilot_bridge.mavlink.event_messages import MESSAGES
+from autopilot_bridge.mavlink.missing_messages import MESSAGES
 
 MAVLinkMessage = dialect.MAVLink_message
 """Base of the messages of the dialect: what a message is before its class is known."""
@@ -143,7 +143,7 @@ def _field_format(field: WireField) -> str:
 DEFINITIONS: Final = MappingProxyType(
     {key: define_class(value) for key, value in {**dialect.mavlink_map, **MESSAGES}.items()}
 )
-"""Every message of the dialect by id, and those that `event_messages` adds."""
+"""Every message of the dialect by id, and those that `missing_messages` adds."""
 
 _BY_NAME: Final = MappingProxyType({item.name: item for item in DEFINITIONS.values()})
 

@@ -155,6 +155,21 @@ class _AuthKey:
 class MAVLink_auth_key_message(_AuthKey, MAVLink_message):
     def __init__(self, key: bytes) -> None: ...
 
+class _LinkNodeStatus:
+    timestamp: int
+    tx_buf: int
+    rx_buf: int
+    tx_rate: int
+    rx_rate: int
+    rx_parse_err: int
+    tx_overflows: int
+    rx_overflows: int
+    messages_sent: int
+    messages_received: int
+    messages_lost: int
+class MAVLink_link_node_status_message(_LinkNodeStatus, MAVLink_message):
+    def __init__(self, timestamp: int, tx_buf: int, rx_buf: int, tx_rate: int, rx_rate: int, rx_parse_err: int, tx_overflows: int, rx_overflows: int, messages_sent: int, messages_received: int, messages_lost: int) -> None: ...
+
 class _SetMode:
     target_system: int
     base_mode: int
@@ -2774,6 +2789,15 @@ class _WifiConfigAp:
 class MAVLink_wifi_config_ap_message(_WifiConfigAp, MAVLink_message):
     def __init__(self, ssid: bytes, password: bytes) -> None: ...
 
+class _ProtocolVersion:
+    version: int
+    min_version: int
+    max_version: int
+    spec_version_hash: Sequence[int]
+    library_version_hash: Sequence[int]
+class MAVLink_protocol_version_message(_ProtocolVersion, MAVLink_message):
+    def __init__(self, version: int, min_version: int, max_version: int, spec_version_hash: Sequence[int], library_version_hash: Sequence[int]) -> None: ...
+
 class _AisVessel:
     MMSI: int
     lat: int
@@ -3038,6 +3062,15 @@ class _RelayStatus:
     present: int
 class MAVLink_relay_status_message(_RelayStatus, MAVLink_message):
     def __init__(self, time_boot_ms: int, on: int, present: int) -> None: ...
+
+class _TimeEstimateToTarget:
+    safe_return: int
+    land: int
+    mission_next_item: int
+    mission_end: int
+    commanded_action: int
+class MAVLink_time_estimate_to_target_message(_TimeEstimateToTarget, MAVLink_message):
+    def __init__(self, safe_return: int, land: int, mission_next_item: int, mission_end: int, commanded_action: int) -> None: ...
 
 class _Tunnel:
     target_system: int

@@ -14,7 +14,7 @@ from typing import Final
 from pymavlink.dialects.v20 import all as pymavlink_dialect
 
 from autopilot_bridge.mavlink.definitions import MAVLinkMessage
-from autopilot_bridge.mavlink.event_messages import MESSAGES
+from autopilot_bridge.mavlink.missing_messages import MESSAGES
 
 STUB: Final = Path(__file__).with_name("dialect.pyi")
 

@@ -14,7 +14,7 @@ import pymavlink.dialects.v20
 
 from autopilot_bridge.mavlink import DEFINITIONS, MAVLinkMessage, MessageDefinition
 from autopilot_bridge.mavlink.definitions import define, define_class
-from autopilot_bridge.mavlink.event_messages import MESSAGES
+from autopilot_bridge.mavlink.missing_messages import MESSAGES
 from estimators.errors import LogError
 from estimators.logs.xml_definitions import FieldText, MessageText, read_definitions
 from estimators.messages import Message, message_class

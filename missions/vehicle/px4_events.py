@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final
 
-from autopilot_bridge.mavlink.event_messages import event_sub_id
+from autopilot_bridge.mavlink.event_ids import event_sub_id
 
 _SUB_ID_BITS: Final = 0xFFFFFF
 _LEVEL_BITS: Final = 0x0F  # the level for the pilot; the upper half is that for the log

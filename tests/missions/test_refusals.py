@@ -3,7 +3,7 @@
 import pytest
 
 from autopilot_bridge.mavlink import dialect
-from autopilot_bridge.mavlink.event_messages import event_sub_id
+from autopilot_bridge.mavlink.event_ids import event_sub_id
 from missions.errors import CommandRejected
 from missions.vehicle.px4_events import reason
 

@@ -21,7 +21,6 @@ from autopilot_bridge.services.commands.command import (
 from autopilot_bridge.services.commands.handlers import CommandHandlers
 
 _CUSTOM_MODE_FLAG = 1
-_PROTOCOL_VERSION = 300
 
 
 class Px4Commands(CommandHandlers):
@@ -192,7 +191,7 @@ class Px4Commands(CommandHandlers):
     @command(dialect.MAV_CMD_REQUEST_PROTOCOL_VERSION)
     def request_protocol_version(self, command: Command, source: Source) -> Result:
         """REQUEST_PROTOCOL_VERSION, the former request."""
-        return self.parts.intervals.request(source, _PROTOCOL_VERSION)
+        return self.parts.intervals.request(source, dialect.MAVLink_protocol_version_message.id)
 
     @command(dialect.MAV_CMD_DO_VTOL_TRANSITION, dialect.MAV_CMD_SET_CAMERA_MODE)
     def silence(self, command: Command, source: Source) -> None:

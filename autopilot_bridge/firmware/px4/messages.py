@@ -48,6 +48,10 @@ _TARGET_BITS: Final = (1, 2, 4, 8, 16, 32, 64, 128, 256, 1024, 2048)
 _FREE_FALL_M_S2: Final = 100.0
 """Downward acceleration that PX4 commands while the motors are off."""
 
+_PROTOCOL_VERSION: Final = fields("PROTOCOL_VERSION")
+_MAVLINK_LIBRARY: Final = tuple(bytes.fromhex("776d5582cee4f017"))
+"""Revision of the MAVLink library of 1.16.1, as PROTOCOL_VERSION has it."""
+
 ODID_EPOCH_UNIX_S: Final = 1546300800
 """2019-01-01, the epoch of Open Drone ID's system time stamp."""
 
@@ -88,6 +92,13 @@ class Px4Messages(CommonMessages):
             arming_time_utc=self._armed_us,
             takeoff_time_utc=self._takeoff_us,
             flight_uuid=int(self.parts.parameters.get("COM_FLIGHT_UUID") or 0),
+        )
+
+    @streams(_M.MAVLink_protocol_version_message)
+    def protocol_version(self) -> FieldValues:
+        """PROTOCOL_VERSION (300): MAVLink 2, from 1 on."""
+        return _PROTOCOL_VERSION(
+            version=200, min_version=100, max_version=200, library_version_hash=_MAVLINK_LIBRARY
         )
 
     @streams(_M.MAVLink_actuator_output_status_message)

@@ -9,7 +9,7 @@ import pymavlink.dialects.v20
 import pytest
 from pymavlink.generator import mavparse
 
-from autopilot_bridge.mavlink.event_messages import MESSAGES
+from autopilot_bridge.mavlink.missing_messages import MESSAGES
 from estimators.logs import LogError, open_log
 from estimators.logs.dialect import dialect_names, load_dialect
 from estimators.logs.units import SI, to_si

@@ -1,10 +1,11 @@
-"""Messages of MAVLink's `common` set that PyPI's pymavlink leaves out: component metadata and events.
+"""Messages of MAVLink's `common` set that PyPI's pymavlink leaves out: state and version of a link, times to
+targets, component metadata and events.
 
 Classes of the same shape as pymavlink's, from the definitions in common.xml, so that they are encoded and
 decoded like all others.
 
-Source: mavlink.io/en/messages/common.html, messages 397 and 410 to 413; checksum seeds by the rule of the
-MAVLink guide ("Serialization", CRC_EXTRA).
+Source: mavlink.io/en/messages/common.html, messages 8, 300, 380, 397 and 410 to 413; checksum seeds by the rule
+of the MAVLink guide ("Serialization", CRC_EXTRA).
 """
 
 import struct
@@ -13,8 +14,14 @@ from typing import Final
 from fastcrc.crc16 import mcrf4xx
 from pymavlink.dialects.v20 import all as dialect
 
-_SIZES: Final = {"uint8_t": 1, "char": 1, "uint16_t": 2, "uint32_t": 4}
-_CODES: Final = {"uint8_t": "B", "char": "s", "uint16_t": "H", "uint32_t": "I"}
+_CODES: Final = {
+    "uint8_t": "B",
+    "char": "s",
+    "uint16_t": "H",
+    "uint32_t": "I",
+    "int32_t": "i",
+    "uint64_t": "Q",
+}
 
 Field = tuple[str, str, int]
 """Type, name, length of the array or 0."""
@@ -37,7 +44,9 @@ def _code(kind: str, length: int) -> str:
 
 def _message_class(message_id: int, name: str, fields: list[Field]) -> type[dialect.MAVLink_message]:
     """A class like pymavlink's, whose constructor takes the fields in order."""
-    ordered = sorted(fields, key=lambda field: -_SIZES[field[0]])  # stable: the order on the wire
+    ordered = sorted(
+        fields, key=lambda field: -struct.calcsize(_CODES[field[0]])
+    )  # stable: the order on the wire
     names = [field for _, field, _ in fields]
     wire = struct.Struct("<" + "".join(_code(kind, length) for kind, _, length in ordered))
     strings = {field for kind, field, _ in fields if kind == "char"}
@@ -82,6 +91,45 @@ def _message_class(message_id: int, name: str, fields: list[Field]) -> type[dial
     )
 
 
+LinkNodeStatus: Final = _message_class(
+    8,
+    "LINK_NODE_STATUS",
+    [
+        ("uint64_t", "timestamp", 0),
+        ("uint8_t", "tx_buf", 0),
+        ("uint8_t", "rx_buf", 0),
+        ("uint32_t", "tx_rate", 0),
+        ("uint32_t", "rx_rate", 0),
+        ("uint16_t", "rx_parse_err", 0),
+        ("uint16_t", "tx_overflows", 0),
+        ("uint16_t", "rx_overflows", 0),
+        ("uint32_t", "messages_sent", 0),
+        ("uint32_t", "messages_received", 0),
+        ("uint32_t", "messages_lost", 0),
+    ],
+)
+ProtocolVersion: Final = _message_class(
+    300,
+    "PROTOCOL_VERSION",
+    [
+        ("uint16_t", "version", 0),
+        ("uint16_t", "min_version", 0),
+        ("uint16_t", "max_version", 0),
+        ("uint8_t", "spec_version_hash", 8),
+        ("uint8_t", "library_version_hash", 8),
+    ],
+)
+TimeEstimateToTarget: Final = _message_class(
+    380,
+    "TIME_ESTIMATE_TO_TARGET",
+    [
+        ("int32_t", "safe_return", 0),
+        ("int32_t", "land", 0),
+        ("int32_t", "mission_next_item", 0),
+        ("int32_t", "mission_end", 0),
+        ("int32_t", "commanded_action", 0),
+    ],
+)
 ComponentMetadata: Final = _message_class(
     397,
     "COMPONENT_METADATA",
@@ -127,14 +175,15 @@ ResponseEventError: Final = _message_class(
 
 MESSAGES: Final = {
     each.id: each
-    for each in (ComponentMetadata, EventMessage, CurrentEventSequence, RequestEvent, ResponseEventError)
+    for each in (
+        LinkNodeStatus,
+        ProtocolVersion,
+        TimeEstimateToTarget,
+        ComponentMetadata,
+        EventMessage,
+        CurrentEventSequence,
+        RequestEvent,
+        ResponseEventError,
+    )
     if each.id not in dialect.mavlink_map  # a newer pymavlink has its own
 }
-
-
-def event_sub_id(name: str) -> int:
-    """Lower 24 bits of an event's number: FNV-1a of its name, as PX4 numbers its events."""
-    number = 0x811C9DC5
-    for byte in name.encode():
-        number = (number ^ byte) * 0x01000193 & 0xFFFFFFFF
-    return number & 0xFFFFFF
