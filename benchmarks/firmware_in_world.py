@@ -31,14 +31,17 @@ VEHICLES: Final[Mapping[str, tuple[AirframeKind, str]]] = {
     "plane": (AirframeKind.FIXED_WING, "aerosonde"),
 }
 MISSIONS: Final[Mapping[str, Mapping[str, tuple[str, ...]]]] = {
-    "lissajous": {"copter": (), "plane": ()},
-    "sector": {"copter": (), "plane": ()},
-    "orbit": {"plane": ()},
-    "occupancy": {
-        "copter": ("--size", "600", "--altitude", "50", "--identify", "bayes"),
-        "plane": ("--size", "1600", "--identify", "bayes"),
+    "lissajous": {
+        "copter": ("--pattern", "L1", "--size", "60"),
+        "plane": ("--pattern", "L1", "--size", "600"),
     },
-    "multi-target": {"copter": (), "plane": ()},
+    "sector": {"copter": ("--size", "80"), "plane": ("--size", "800")},
+    "orbit": {"plane": ("--duration", "120")},
+    "occupancy": {
+        "copter": ("--size", "400", "--altitude", "50", "--identify", "bayes"),
+        "plane": ("--size", "1200", "--identify", "bayes"),
+    },
+    "multi-target": {"copter": ("--steps", "60"), "plane": ("--steps", "40")},
     "vision-search": {"copter": ("--vehicles", "2")},
     "survey": {"plane": ("--size", "600", "--spacing", "100")},
     "handoff": {"plane": ("--vehicles", "2")},

@@ -4,8 +4,8 @@ targets, component metadata and events.
 Classes of the same shape as pymavlink's, from the definitions in common.xml, so that they are encoded and
 decoded like all others.
 
-Source: mavlink.io/en/messages/common.html, messages 8, 300, 380, 397 and 410 to 413; checksum seeds by the rule
-of the MAVLink guide ("Serialization", CRC_EXTRA).
+Source: mavlink.io/en/messages/common.html, messages 8, 300, 380, 397 and 410 to 413; checksum seeds by the
+rule of the MAVLink guide ("Serialization", CRC_EXTRA).
 """
 
 import struct
