@@ -24,11 +24,12 @@ from autopilot_bridge.mavlink.vehicle_motion import (
     motion_message,
     read_motion_payload,
 )
+from estimators import wire
 from estimators.handoff import HandoffEstimator, HandoffSettings
 from estimators.handoff.designation import Designation
 from estimators.handoff.scans import ScanAssembler
 from estimators.interface import Outcome
-from estimators.messages import read_message
+from estimators.messages import read_as
 from estimators.runner import Runner
 from tests.estimators.handoff.scenes import APART, HANDOFF, TRACKER, Scene
 
@@ -80,7 +81,7 @@ def test_scans_are_placed_when_the_aircraft_have_not_booted_together():
 
 def test_an_old_pressure_makes_no_report_of_the_motion():
     """PX4's SCALED_PRESSURE is by 0.14 s older than its newest inertial sample."""
-    times_us = []
+    times_us: list[int] = []
 
     class Pressed(Scene):
         def look(self, time_us, system, aircraft):
@@ -89,10 +90,12 @@ def test_an_old_pressure_makes_no_report_of_the_motion():
             super().look(time_us, system, aircraft)
 
     def link(now_us, to, frame):
-        message = read_message(frame)
+        message = read_as(frame, wire.TUNNEL)
         if message.payload_type == VEHICLE_MOTION_PAYLOAD:
             fields = message.payload_type, message.payload_length, message.payload
-            times_us.append(read_motion_payload(*fields).time_us)
+            motion = read_motion_payload(*fields)
+            assert motion is not None
+            times_us.append(motion.time_us)
         return []
 
     Pressed(link=link).fly(4.0)
