@@ -127,7 +127,7 @@ class MultiTargetEstimator(Estimator[MultiTargetParameters]):
         belief = self.belief
         # the time in the message, and not when it was received, so that a scan has one time on every link
         time_us = scan.time_us + searcher.offset_us
-        belief.observe(time_us, scan.detections, viewpoint)
+        belief.observe(time_us, scan.detections, viewpoint, message.src_system)
         self._estimates = (
             MultiTargetEstimate(time_us=time_us, targets=belief.targets),
             self._search(time_us, message.src_system),
@@ -195,7 +195,7 @@ class MultiTargetEstimator(Estimator[MultiTargetParameters]):
         """FOLLOW_TARGET for each target found since the last call, with its standard deviation per axis in
         `position_cov`.
         """
-        frame, new = self._frame, self.belief.found[self._unpublished :]
+        frame, new = self._frame, self.belief.found_so_far[self._unpublished :]
         self._unpublished += len(new)
         if frame is None:
             return []

@@ -59,6 +59,14 @@ class MultiTargetParameters(Options):
     heading_sigma_rad: float = option(
         0.02, least=0.0, help="Standard deviation of the vehicle's own heading."
     )
+    range_bias_sigma_m: float = option(
+        0.5, least=0.0, help="Standard deviation of a range error that all scans of a vehicle share."
+    )
+    bearing_bias_sigma_rad: float = option(
+        math.radians(2.0),
+        least=0.0,
+        help="Standard deviation of a bearing or heading error that all scans of a vehicle share.",
+    )
     clutter_per_scan: float = option(0.0, least=0.0, help="Mean number of false detections in a scan.")
     unknown_clutter_per_scan: float = option(
         0.2,

@@ -11,6 +11,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from estimators.tracking.motion import Motion
 from estimators.tracking.range_bearing import Viewpoint
 
 __all__ = ["BirthIntensity", "Cluster", "TargetIntensity"]
@@ -40,7 +41,13 @@ class Cluster:
 
 
 class TargetIntensity(Protocol):
-    """A belief about any number of targets. Places are north and east in metres."""
+    """A belief about any number of targets. Places are north and east in metres.
+
+    Attributes:
+        motion: of the targets; may be set.
+    """
+
+    motion: Motion
 
     @property
     def expected_targets(self) -> float:

@@ -84,7 +84,7 @@ class ErgodicPlanner:
     def _expected(self, belief: SearchBelief) -> Array:
         """Coefficients of the targets that are expected and not found."""
         north, east, undetected_m2 = belief.exploration.points()
-        detected = belief.intensity.points()
+        detected = belief.points()
         north, east = np.concatenate((north, detected[0])), np.concatenate((east, detected[1]))
         mass = np.concatenate((belief.parameters.birth_per_m2 * undetected_m2, detected[2]))
         # cosines of multiples by their product over both axes

@@ -79,7 +79,7 @@ class ExploringPlanner:
         p = self._parameters
         objective = SearchObjective(
             belief.sensor,
-            belief.intensity.points(),
+            belief.points(),
             belief.exploration,
             p.alpha,
             kind=p.exploration,
