@@ -5,9 +5,9 @@ or a heading that is biased, are of the same place only when they are taken from
 that does not stay leaves the place where it was found. So the places of all found targets and the biases of
 each vehicle's sensor are the states of one linear filter (the stochastic map of Smith, Self and Cheeseman
 1990), and how far targets walk is a hypothesis: one filter for each level of `WALKS`, weighted by what it
-predicts (static multiple models, Bar-Shalom, Li and Kirubarajan 2001, section 11.6). A measurement may belong to
-something else; it is used in proportion to the probability that it does not (probabilistic data association,
-the same book, section 3.4).
+predicts (static multiple models, Bar-Shalom, Li and Kirubarajan 2001, section 11.6). A measurement may
+belong to something else; it is used in proportion to the probability that it does not (probabilistic data
+association, Bar-Shalom and Tse 1975).
 """
 
 import math
@@ -130,7 +130,7 @@ class FoundTargets:
             vehicle: whose sensor measured.
         """
         bias, first = self._bias_states(vehicle), self._targets[number]
-        levels, size = self._means.shape
+        size = self._means.shape[1]
         corrected = measured - self.bias(vehicle)
         scan = corrected[None]
         place = self._sensor.places(scan, viewpoint)[0]
