@@ -62,6 +62,12 @@ PATTERNS: Final[Mapping[str, PatternEntry]] = MappingProxyType(
             size="square_size",
             options=("heading", "spacing"),
         ),
+        "ergodic": PatternEntry(
+            help="Fly an ergodic search: each part of the area has an equal share of the time.",
+            curve="ergodic_curve",
+            size="square_size",
+            options=("heading", "spacing"),
+        ),
     }
 )
 

@@ -13,7 +13,8 @@ class TargetRow:
 
     Attributes:
         north_m, east_m: place from the origin.
-        mass: expected number of targets at that place; for a found target at most 1, when it was found.
+        mass: expected number of targets at that place; for a found target the probability that it is within
+            `found_distance_m` of it.
         width_m: standard deviation per axis.
         found: whether it counts as found.
     """

@@ -12,6 +12,7 @@ from missions.patterns import (
     Lap,
     Lissajous,
     Polyline,
+    ergodic,
     expanding_square,
     named_lissajous,
     parallel_sweep,
@@ -144,6 +145,19 @@ def expanding_square_curve(options: FlightOptions) -> Curve:
         )
 
     return _in_passes(make, options, min(options.width_m, options.height_m) ** 2 / options.spacing_m)
+
+
+def ergodic_curve(options: FlightOptions) -> Curve:
+    one_pass_m = options.width_m * options.height_m / options.spacing_m
+    length_m = one_pass_m * _passes(options, one_pass_m)
+    _check_length(length_m, options)
+    return ergodic(
+        width_m=options.width_m,
+        height_m=options.height_m,
+        spacing_m=options.spacing_m,
+        length_m=length_m,
+        heading_rad=options.heading_rad + math.tau * options.index / options.vehicles,
+    )
 
 
 def lissajous_size(options: FlightOptions, limits: FixedWingLimits) -> FlightOptions:

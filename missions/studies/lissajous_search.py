@@ -1,5 +1,5 @@
-"""The Monte Carlo study `lissajous-search`: how soon seven patterns find a walking tag (Steckenrider, Leamy
-and Furukawa 2020, Table I), as flights on SITL with rendered pictures.
+"""The Monte Carlo study `lissajous-search`: how soon patterns find a walking tag, as flights on SITL with
+rendered pictures: the seven of Steckenrider, Leamy and Furukawa 2020, Table I, and an ergodic search.
 """
 
 import math
@@ -21,7 +21,7 @@ from missions.pattern_search.tag_target import TagTarget
 from missions.pattern_search.world import tag_search_world
 from missions.studies.design import grid
 from missions.studies.flights import fly_trial
-from missions.studies.options import LissajousStudyOptions
+from missions.studies.options import LissajousStudyOptions, SearchPatterns
 from missions.studies.results import Results
 from missions.studies.statistics import paired_difference, rate_of
 from missions.studies.study import Study
@@ -39,12 +39,11 @@ __all__ = [
 Array = NDArray[np.float64]
 
 LIMIT_S: Final = 1800.0
+_LISSAJOUS: Final = (SearchPatterns.L1, SearchPatterns.L2, SearchPatterns.L3, SearchPatterns.L4)
 PATTERNS: Final[Mapping[str, tuple[str, str]]] = MappingProxyType(
     {
-        **{name: ("lissajous", name) for name in ("L1", "L2", "L3", "L4")},
-        "sector": ("sector", "L3"),
-        "parallel_sweep": ("parallel-sweep", "L3"),
-        "expanding_square": ("expanding-square", "L3"),
+        name.value: ("lissajous", name.value) if name in _LISSAJOUS else (name.value.replace("_", "-"), "L3")
+        for name in SearchPatterns
     }
 )
 """Mission and named Lissajous pattern of each entry."""
@@ -60,7 +59,7 @@ PAPER: Final[Mapping[str, tuple[int, float | None, float | None]]] = MappingProx
         "expanding_square": (5, 304.4, 174.0),
     }
 )
-"""Table I: found of seven, mean and standard deviation of the time in seconds."""
+"""Table I: found of seven, mean and standard deviation of the time in seconds. It has no ergodic search."""
 _PAPER_RUNS: Final = 7
 _BASELINE: Final = "parallel_sweep"  # the standard pattern with the most searches that found the target
 _CUT_SHORT_S: Final = 1.0  # a search that ends so much before the limit was cut short
@@ -142,11 +141,12 @@ def study(options: LissajousStudyOptions | None = None) -> Study[LissajousSearch
     o = options or LissajousStudyOptions()
     return Study(
         name="lissajous-search",
-        description="Seven patterns search for a walking tag: Table I of Steckenrider et al. 2020.",
+        description="Patterns search for a walking tag: Table I of Steckenrider et al. 2020, and an ergodic "
+        "search.",
         trial=SearchTrial(speed_m_s=o.speed_m_s, target_speed_m_s=o.target_speed_m_s),
         parameters=LissajousSearchCell,
         row=Searched,
-        design=grid(pattern=tuple(PATTERNS)),
+        design=grid(pattern=tuple(name for name in PATTERNS if name in o.pattern)),
         runs=100,
         success="completed",
         metrics=("search_s", "error_m"),
@@ -174,9 +174,13 @@ def survival(time_s: Array, found: NDArray[np.bool_]) -> tuple[Array, Array]:
     return np.asarray(curve.quantiles, dtype=np.float64), np.asarray(curve.probabilities, dtype=np.float64)
 
 
+def _patterns(results: Results) -> list[str]:
+    return [str(cell["pattern"]) for cell in results.cells]
+
+
 def _rows(results: Results, pattern: str) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]:
     """Of each run of a pattern the time, whether the tag was found, and whether the search was begun."""
-    cell = next(index for index, one in enumerate(results.cells) if one["pattern"] == pattern)
+    cell = _patterns(results).index(pattern)
     time_s, found = results.values("search_s")[cell], results.values("found")[cell] == 1.0
     return time_s, found, found | (time_s > 0.0)  # NaN: the trial itself failed
 
@@ -200,7 +204,7 @@ def _restricted(results: Results, pattern: str) -> Array:
 
 def summarise(results: Results) -> Mapping[str, Any]:
     """Entries of `summary.json`: the searches of each pattern, beside the paper's."""
-    return {"patterns": {name: _pattern(results, name) for name in PATTERNS}, "limit_s": LIMIT_S}
+    return {"patterns": {name: _pattern(results, name) for name in _patterns(results)}, "limit_s": LIMIT_S}
 
 
 def _pattern(results: Results, name: str) -> dict[str, Any]:
@@ -214,6 +218,9 @@ def _pattern(results: Results, name: str) -> dict[str, Any]:
         "restricted_mean_s": None,
         "restricted_mean_ci95_s": None,
         "median_s": None,
+        "minus_parallel_sweep_s": None,
+        "minus_parallel_sweep_ci95_s": [None, None],
+        "paper": None,
     }
     if len(found):
         restricted = np.where(found, np.minimum(time_s, LIMIT_S), LIMIT_S)
@@ -226,9 +233,12 @@ def _pattern(results: Results, name: str) -> dict[str, Any]:
         times, missed = survival(time_s, found)
         below = np.flatnonzero(missed <= 0.5)
         entry["median_s"] = _rounded(float(times[below[0]])) if len(below) else None
-    gap = paired_difference(_restricted(results, name), _restricted(results, _BASELINE))
-    entry["minus_parallel_sweep_s"] = _rounded(gap.mean)
-    entry["minus_parallel_sweep_ci95_s"] = [_rounded(value) for value in gap.ci95]
+    if _BASELINE in _patterns(results):
+        gap = paired_difference(_restricted(results, name), _restricted(results, _BASELINE))
+        entry["minus_parallel_sweep_s"] = _rounded(gap.mean)
+        entry["minus_parallel_sweep_ci95_s"] = [_rounded(value) for value in gap.ci95]
+    if name not in PAPER:
+        return entry
     paper_found, mean_s, sd_s = PAPER[name]
     low, high = rate_of(paper_found, _PAPER_RUNS).ci95
     entry["paper"] = {
@@ -259,10 +269,11 @@ def lines_of(results: Results) -> list[str]:
         mean, restricted, median = ("" if value is None else f"{value:.0f}" for value in numbers)
         gap, (least, most) = entry["minus_parallel_sweep_s"], entry["minus_parallel_sweep_ci95_s"]
         sooner = "" if gap is None or name == _BASELINE else f"{gap:+.0f} ({least:+.0f} to {most:+.0f})"
-        theirs = "" if paper["mean_s"] is None else f"{paper['mean_s']:.0f}"
+        theirs = "" if paper is None else f"{paper['found']}/7"
+        their_mean = "" if paper is None or paper["mean_s"] is None else f"{paper['mean_s']:.0f}"
         lines.append(
             f"{name:<17} {entry['found']:>4} / {entry['runs']:<3} {shown:>14} {mean:>8} {restricted:>13} "
-            f"{median:>9} {sooner:>20} {paper['found']:>4}/7 {theirs:>7}"
+            f"{median:>9} {sooner:>20} {theirs:>6} {their_mean:>7}"
         )
     return lines
 
@@ -272,7 +283,7 @@ def draw(results: Results, folder: Path) -> None:
 
     figure = blank_figure(7.2, 4.2)
     axes = figure.subplots()
-    for name in PATTERNS:
+    for name in _patterns(results):
         time_s, found = _searches(results, name)
         if not len(found):
             continue

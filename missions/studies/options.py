@@ -192,10 +192,26 @@ class LocalizationStudyOptions(PlanOptions):
     )
 
 
+class SearchPatterns(StrEnum):
+    """Patterns of the study `lissajous-search`: those of the paper, and an ergodic search."""
+
+    L1 = "L1"
+    L2 = "L2"
+    L3 = "L3"
+    L4 = "L4"
+    SECTOR = "sector"
+    PARALLEL_SWEEP = "parallel_sweep"
+    EXPANDING_SQUARE = "expanding_square"
+    ERGODIC = "ergodic"
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LissajousStudyOptions(PlanOptions):
     """Options of the study `lissajous-search`."""
 
+    pattern: tuple[SearchPatterns, ...] = option(
+        tuple(SearchPatterns), help="Patterns that are compared; repeat."
+    )
     speed_m_s: float = option(
         5.0, least=0.5, most=10.0, help="Speed of the vehicle; the paper does not give it."
     )

@@ -18,6 +18,7 @@ from missions.patterns import (
     Lap,
     Lissajous,
     Polyline,
+    ergodic,
     expanding_square,
     named_lissajous,
     parallel_sweep,
@@ -253,3 +254,30 @@ def test_legs_of_no_length_are_refused():
         Polyline(((0.0, 0.0), (0.0, 0.0)))
     with pytest.raises(PlanError, match="fewer than two points"):
         Polyline(((0.0, 0.0),))
+
+
+def test_ergodic_coverage_gives_each_part_of_the_area_its_share_of_the_time():
+    curve = ergodic(width_m=120.0, height_m=80.0, spacing_m=8.0, length_m=12_000.0, heading_rad=0.4)
+    assert curve.length_m == pytest.approx(12_000.0, abs=8.0)
+    places = np.array(curve.vertices_m)
+    assert np.abs(places).max(axis=0) == pytest.approx([40.0, 60.0], abs=8.0)  # single turns lead out
+    inside = places[(np.abs(places) < (36.0, 56.0)).all(axis=1)]
+    shares = np.histogram2d(inside[:, 0], inside[:, 1], bins=(3, 4), range=((-36, 36), (-56, 56)))[0]
+    assert shares.min() > 0.6 * shares.mean() and shares.max() < 1.4 * shares.mean()
+    legs = np.diff(places, axis=0)
+    turns = np.abs(np.diff(np.unwrap(np.arctan2(legs[:, 1], legs[:, 0]))))
+    assert turns.max() <= math.pi / 2.0 + 1e-9
+
+
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ({"spacing_m": 50.0}, "at most 40 m"),
+        ({"length_m": math.nan}, "length nan"),
+        ({"width_m": -1.0}, "width -1"),
+    ],
+)
+def test_an_ergodic_pattern_that_does_not_fit_is_refused(changes, reason):
+    sides = {"width_m": 120.0, "height_m": 80.0, "spacing_m": 8.0, "length_m": 500.0}
+    with pytest.raises(PlanError, match=reason):
+        ergodic(**sides | changes)

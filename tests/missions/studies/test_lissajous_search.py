@@ -17,7 +17,7 @@ from missions.studies.lissajous_search import (
 
 
 def test_all_patterns_of_the_table_are_there():
-    assert set(PATTERNS) == set(PAPER)
+    assert set(PATTERNS) - set(PAPER) == {"ergodic"}
     assert [cell["pattern"] for cell in study().design.cells] == list(PATTERNS)
 
 
