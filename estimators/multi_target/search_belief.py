@@ -162,12 +162,11 @@ class SearchBelief:
         places = self.sensor.places(scan, viewpoint)
         kept = self.exploration.near_area(places[:, 0], places[:, 1])
         self.outside += int(np.count_nonzero(~kept))
-        means, covariances = self._found.places()
-        noise = self.sensor.covariances(scan, viewpoint)
-        for number, mean in enumerate(means):
+        means, _ = self._found.places()
+        found = zip(means, self._found.distances(raw, viewpoint, vehicle), strict=True)
+        for number, (mean, distance) in enumerate(found):
             off = places - mean
             own = np.hypot(off[:, 0], off[:, 1]) <= self.parameters.found_distance_m
-            distance = np.einsum("ni,nij,nj->n", off, np.linalg.inv(noise + covariances[number]), off)
             own |= distance <= _OWN_GATE
             distance[~(own & kept)] = math.inf
             nearest = int(np.argmin(distance))

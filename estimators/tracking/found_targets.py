@@ -70,8 +70,8 @@ class FoundTargets:
 
     @property
     def walk_m_sqrt_s(self) -> float:
-        """Walk of the targets, root of the mean square over the levels."""
-        return math.sqrt(float(self.levels @ self._walks_m2_s))
+        """Most probable walk of the targets."""
+        return math.sqrt(float(self._walks_m2_s[int(np.argmax(self._log_levels))]))
 
     def predict(self, dt_s: float) -> None:
         """Let the targets walk for a time."""
@@ -81,15 +81,41 @@ class FoundTargets:
 
     def places(self) -> tuple[Array, Array]:
         """Means (n, 2), north and east, and covariances (n, 2, 2) over the levels."""
+        mean, covariance = self._moments()
+        own = self._own_states()
+        return mean[own], covariance[own[:, :, None], own[:, None, :]]
+
+    def distances(self, scan: Array, viewpoint: Viewpoint, vehicle: int) -> Array:
+        """Squared distances (n, m) of measurements (m, 2) from where each target is expected in the scan, in
+        standard deviations. A bias that both share with the place is no distance.
+        """
+        mean, covariance = self._moments()
+        own, expected = self._own_states(), self.bias(vehicle)
+        scan = scan - expected
+        places = self._sensor.places(scan, viewpoint)
+        noise = self._sensor.covariances(scan, viewpoint)
+        spread = covariance[own[:, :, None], own[:, None, :]][:, None] + noise
+        first = self._sensors.get(vehicle)
+        if first is not None:
+            bias = slice(first, first + 2)
+            by_bias = np.array([_bias_derivative(place, viewpoint) for place in places]).reshape(-1, 2, 2)
+            shared = np.einsum("mij,njk->nmik", by_bias, covariance[bias][:, own].transpose(1, 0, 2))
+            spread = spread + shared + np.swapaxes(shared, 2, 3)
+            spread = spread + by_bias @ covariance[bias, bias] @ np.swapaxes(by_bias, 1, 2)
+        off = places[None] - mean[own][:, None]
+        found: Array = np.einsum("nmi,nmij,nmj->nm", off, np.linalg.inv(spread), off)
+        return found
+
+    def _moments(self) -> tuple[Array, Array]:
+        """Mean and covariance of all states over the levels."""
         levels = self.levels
-        chosen = np.array([(first, first + 1) for first in self._targets], dtype=np.intp).reshape(-1, 2)
-        means = self._means[:, chosen]
-        mean = np.einsum("l,lni->ni", levels, means)
-        off = means - mean
-        blocks = (
-            self._covariances[:, chosen[:, :, None], chosen[:, None, :]] + off[..., None] * off[..., None, :]
-        )
-        return mean, np.einsum("l,lnij->nij", levels, blocks)
+        mean = levels @ self._means
+        off = self._means - mean
+        return mean, np.einsum("l,lij->ij", levels, self._covariances) + (off.T * levels) @ off
+
+    def _own_states(self) -> NDArray[np.intp]:
+        """(n, 2) states of each target."""
+        return np.array([(first, first + 1) for first in self._targets], dtype=np.intp).reshape(-1, 2)
 
     def bias(self, vehicle: int) -> Array:
         """(2,) range and bearing by which a vehicle's measurements are expected to be too large."""
