@@ -12,12 +12,12 @@ from autopilot_bridge.mavlink.components import AUTOPILOT_COMPONENT
 from estimators import wire
 from estimators.errors import EstimatorError, EstimatorFailure
 from estimators.fleet import GROUND_SYSTEM, Fleet
-from estimators.interface import Estimator, Need
+from estimators.interface import Estimator, Need, Outcome
 from estimators.library import make_estimator
 from estimators.messages import Message, is_a
 from estimators.needs import NOT_STREAMED, Supply, supplies
 from estimators.observations import Observation, observations_beside, read_observations
-from estimators.runner import why_excluded
+from estimators.runner import Runner, why_excluded
 
 if TYPE_CHECKING:
     from estimators.logs import Log
@@ -71,6 +71,7 @@ def replay(
     from_s: float | None = None,
     to_s: float | None = None,
     boot: int | None = None,
+    on_estimate: Callable[[Runner], None] | None = None,
 ) -> Replay:
     """Run an estimator over a log, with one runner for each vehicle in it, or over the logs of a team.
 
@@ -79,6 +80,7 @@ def replay(
         estimator: name of an estimator, path of a user's file, or a function that creates a new estimator.
         system_id: the only vehicle to use; None: all in the log.
         from_s, to_s, boot: part of each log to read, with the meaning they have in `Log.inside`.
+        on_estimate: called with a runner when its estimator has a new estimate; may raise EstimatorFailure.
 
     Raises:
         EstimatorError: the estimator does not exist, or needs a message that it is not allowed to receive; or
@@ -98,15 +100,18 @@ def replay(
     if not (fleet.team and lacking) and served:
         try:
             for time_us, received, inside in _received(opened, fleet, system_id, Part(from_s, to_s, boot)):
+                processed = None
                 if not isinstance(received, Message):
                     if inside:
-                        fleet.observe(received)
+                        processed = fleet.observe(received)
                 # A parameter is logged once and is valid from then on, also when it was logged before the
                 # selected part.
                 elif inside or received.name in NOT_STREAMED:
-                    fleet.take(time_us, received)
+                    processed = fleet.take(time_us, received)
                 else:
                     fleet.pass_over(time_us, received)
+                if on_estimate is not None and processed is not None and processed[1] is Outcome.UPDATED:
+                    on_estimate(processed[0])
         except EstimatorFailure as error:
             failure = str(error)
     return Replay(logs=opened, fleet=fleet, supplies=served, lacking=lacking, failure=failure)

@@ -293,10 +293,13 @@ class Text:
 
     Attributes:
         text: one line.
+        state: short name of a state that lasts from here to the next one at the path: a mode, a phase;
+            viewers draw it as a band over time. "": an event only.
         warning: it is a warning or worse.
     """
 
     text: str
+    state: str = ""
     warning: bool = False
     role: Role = Role.ESTIMATE
 

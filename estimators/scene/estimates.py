@@ -6,45 +6,37 @@ reader's unit, with the band of its `..._sigma_...` or `..._variance_...` column
 """
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import Any, Final
+from collections.abc import Mapping
+from typing import Final
 
 import numpy as np
 
-from estimators.interface import Estimate, EstimateSet
 from estimators.references import quantity_of
+from estimators.scene.shown import Estimates
 from estimators.scene_items import Gaussian, Item, PointSet, Pose, Relative, Role, Value
 from flightsim.foundation.vectors import Vector, wrap_pi
 
-__all__ = ["items_of_estimates"]
+__all__ = ["items_of"]
 
 _PLACES: Final = {"": "place", "offset_": "offset"}
 _WEIGHTS: Final = ("weight", "probability", "mass")
 _NUMBERS: Final = ("target", "vehicle", "lat_deg", "lon_deg")  # that say which, or where once more
 
 
-def items_of_estimates(
-    estimates: Sequence[Estimate] | Sequence[EstimateSet], truth: Mapping[str, float]
-) -> dict[str, Item]:
-    """The items of an estimator's newest estimates, by name.
+def items_of(estimates: Estimates, truth: Mapping[str, float]) -> dict[str, Item]:
+    """The items of estimates, by name.
 
     Args:
-        estimates: `Estimator.estimates`.
+        estimates: of one time.
         truth: the true state at that time by column, as far as it is known: columns that are in it have an
             error.
     """
-    found: dict[str, Item] = {}
-    for estimate in estimates:
-        if hasattr(estimate, "rows"):
-            found |= _of_set(estimate)
-        else:
-            found |= _of_one(estimate, truth)
-    return found
+    return _of_set(estimates) if estimates.of_set else _of_one(estimates, truth)
 
 
-def _of_one(estimate: Any, truth: Mapping[str, float]) -> dict[str, Item]:
-    columns = dict(zip(estimate.COLUMNS, estimate.row(), strict=True))
-    prefix = f"target_{columns['target']:.0f}_" if "target" in columns else ""
+def _of_one(estimate: Estimates, truth: Mapping[str, float]) -> dict[str, Item]:
+    columns = dict(zip(estimate.columns, estimate.values[0].tolist(), strict=True))
+    prefix = "".join(f"{name}_" for name in estimate.names)
     found: dict[str, Item] = {}
     shown = set(_NUMBERS)
     for before, name in _PLACES.items():
@@ -54,7 +46,7 @@ def _of_one(estimate: Any, truth: Mapping[str, float]) -> dict[str, Item]:
         shown |= {f"{before}north_east_correlation"}
         place = _place(columns, before)
         if place is not None:
-            found[prefix + name] = Relative(item=place, system_id=estimate.subject) if before else place
+            found[prefix + name] = Relative(item=place, system_id=estimate.system_id) if before else place
     for column, value in columns.items():
         quantity, unit, factor = quantity_of(column)
         if column in shown or "_sigma" in column or "_variance" in column:
@@ -105,9 +97,9 @@ def _sigma(columns: Mapping[str, float], column: str) -> float:
     return math.nan
 
 
-def _of_set(estimate: Any) -> dict[str, Item]:
-    rows = np.array(estimate.rows(), dtype=np.float64).reshape(-1, len(estimate.COLUMNS))
-    columns = dict(zip(estimate.COLUMNS, rows.T, strict=True))
+def _of_set(estimate: Estimates) -> dict[str, Item]:
+    rows = estimate.values
+    columns = dict(zip(estimate.columns, rows.T, strict=True))
     if "north_m" not in columns or "east_m" not in columns:
         return {}
     points = np.column_stack([columns["north_m"], columns["east_m"], np.zeros(len(rows))])

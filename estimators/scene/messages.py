@@ -305,11 +305,11 @@ class MessageScene:
         mode = mode_name(message.autopilot, message.type, message.base_mode, message.custom_mode)
         if mode != vehicle.mode:
             vehicle.mode = mode
-            self._add(message, "mode", time_us, Text(text=f"mode {mode}"))
+            self._add(message, "mode", time_us, Text(text=f"mode {mode}", state=mode))
         armed = bool(message.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED)
         if armed is not vehicle.armed:
-            if vehicle.armed is not None or armed:
-                self._add(message, "mode", time_us, Text(text="armed" if armed else "disarmed"))
+            state = "armed" if armed else "disarmed"
+            self._add(message, "armed", time_us, Text(text=state, state=state))
             vehicle.armed = armed
 
     def _status_text(self, time_us: int, message: wire.STATUSTEXT) -> None:
@@ -323,8 +323,9 @@ class MessageScene:
         has_fix = message.fix_type >= _FIX_3D
         if has_fix is not vehicle.has_fix:
             if vehicle.has_fix is not None or has_fix:
-                text = "GPS: 3D fix" if has_fix else "GPS: fix lost"
-                self._add(message, "gps/fix", time_us, Text(text=text, warning=not has_fix))
+                state = "3D fix" if has_fix else "no fix"
+                text = Text(text=f"GPS: {state}", state=state, warning=not has_fix)
+                self._add(message, "gps/fix", time_us, text)
             vehicle.has_fix = has_fix
         if message.satellites_visible != _UNKNOWN_SATELLITES and self._is_due(time_us, message):
             satellites = Value(value=float(message.satellites_visible))

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Final, get_args
 
 from estimators.dataclass_records import RecordWriter, read_records
-from estimators.scene.shown import Shown, Subject
+from estimators.scene.shown import Estimates, Shown, Subject
 from estimators.scene_items import Placed, Relative, Role
 from flightsim.foundation.geodesy import GeodeticPosition
 
@@ -17,7 +17,7 @@ __all__ = ["SUFFIX", "SceneWriter", "read_scene", "scene_beside"]
 
 SUFFIX: Final = ".scene"
 _MAGIC: Final = b"FSS1"
-_KINDS: Final[tuple[type[Any], ...]] = get_args(Placed)
+_KINDS: Final[tuple[type[Any], ...]] = (*get_args(Placed), Estimates)
 
 
 class SceneWriter:

@@ -8,8 +8,9 @@ import numpy as np
 
 from estimators.observations import Image, observations_beside, read_observations
 from estimators.scene.messages import ORIGIN, MessageScene
+from estimators.scene.placing import placed
 from estimators.scene.recording import read_scene, scene_beside
-from estimators.scene.shown import Shown, placed
+from estimators.scene.shown import Shown
 from estimators.scene_items import Camera, Entry, Origin, Picture, Placed
 
 if TYPE_CHECKING:
@@ -108,9 +109,7 @@ def _placed_of(waiting: list[Shown], messages: MessageScene) -> Iterator[Entry]:
     if messages.origin is None:
         return
     for shown in waiting:
-        entry = placed(shown, messages)
-        if entry is not None:
-            yield entry
+        yield from placed(shown, messages)
     waiting.clear()
 
 

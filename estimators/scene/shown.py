@@ -1,4 +1,4 @@
-"""What estimators and missions show, as they show it, and how it gets its place on the scene.
+"""What estimators and missions show, as they show it.
 
 They show a mapping of names to items at a time (`Estimator.shown`, `MissionFlight.shown`). `Showing` compares
 it with what they showed before. What has changed is a `Shown`; `placed` makes the entry of it, with what the
@@ -10,12 +10,12 @@ from dataclasses import dataclass, fields, is_dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from estimators.scene.messages import MessageScene
-from estimators.scene_items import Cleared, Entry, Item, Relative
+from estimators.scene_items import Cleared, Item
 from flightsim.foundation.geodesy import GeodeticPosition
 
-__all__ = ["Showing", "Shown", "Subject", "placed"]
+__all__ = ["Estimates", "Showing", "Shown", "Subject"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,6 +32,30 @@ class Subject:
     system_id: int = 0
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Estimates:
+    """Rows of an estimate as an estimator made it; `estimates.items_of` says what they show.
+
+    Attributes:
+        columns: names of the values.
+        values: (n, columns).
+        of_set: the rows are of targets, of which there may be none; else there is one row.
+        system_id: of the estimated vehicle; 0: of targets.
+    """
+
+    columns: tuple[str, ...]
+    values: NDArray[np.float64]
+    of_set: bool
+    system_id: int
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What tells this estimate from others of its class at the same time: the number of its target."""
+        if self.of_set or "target" not in self.columns:
+            return ()
+        return (f"target_{self.values[0, self.columns.index('target')]:.0f}",)
+
+
 class Shown(NamedTuple):
     """An item as an estimator or a mission shows it.
 
@@ -40,13 +64,14 @@ class Shown(NamedTuple):
         name: of the item, from the subject's base.
         time_us: on the clock of the subject.
         origin: of the positions; None: home.
+        item: or estimates, whose items have names of their own.
     """
 
     subject: Subject
     name: str
     time_us: int
     origin: GeodeticPosition | None
-    item: Item
+    item: Item | Estimates
 
 
 class Showing:
@@ -88,24 +113,3 @@ def _same(a: Any, b: Any) -> bool:
     if is_dataclass(a):
         return all(_same(getattr(a, field.name), getattr(b, field.name)) for field in fields(a))
     return bool(a == b)
-
-
-def placed(shown: Shown, messages: MessageScene) -> Entry | None:
-    """The entry of what is shown; None: where it is is not known (yet).
-
-    Args:
-        shown: the item, with its subject's time and origin.
-        messages: the scene of the messages until then.
-    """
-    subject, item = shown.subject, shown.item
-    path = f"{subject.base}/{shown.name}"
-    time_us = shown.time_us
-    if subject.system_id:
-        time_us = messages.timeline.common_us(time_us, subject.system_id)
-    if isinstance(item, Relative):
-        place = messages.place_of_vehicle(item.system_id)
-        return None if place is None else Entry(path, time_us, item.item.moved(place))
-    if shown.origin is None:
-        return Entry(path, time_us, item)
-    shift = messages.shift_of(shown.origin)
-    return None if shift is None else Entry(path, time_us, item.moved(shift))

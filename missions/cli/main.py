@@ -25,6 +25,7 @@ _COMMANDS: Final = {
     "report": ("missions.cli.report", "report", "Summary and picture from the log of a killed program."),
     "check": ("missions.cli.check", "check", "Runs and logs against limits, for continuous integration."),
     "log": ("missions.cli.log", "log", "Look into logs, and make others of them."),
+    "view": ("missions.cli.view", "view", "Runs and logs in a viewer: vehicles, beliefs, errors, events."),
     "estimate": ("missions.cli.estimate", "estimate", "An estimator on a live link, a process of its own."),
     "replay": ("missions.cli.replay", "replay", "Logs through an estimator, and how far off it was."),
     "vision": ("missions.cli.vision", "vision", "Tags in a video: a live stream's, or a log's."),

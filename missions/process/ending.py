@@ -87,6 +87,19 @@ def signal_of(interrupt: KeyboardInterrupt) -> int:
     return interrupt.number if isinstance(interrupt, EndedBySignal) else signal.SIGINT
 
 
+class _Interrupting(EndSignalHandler):
+    """A context in which each of the signals raises EndedBySignal."""
+
+    def _on_signal(self, number: int, frame: FrameType | None) -> None:
+        raise EndedBySignal(number)
+
+
+def wait_for_interrupt() -> None:
+    """Wait until Ctrl-C, SIGTERM or SIGHUP, which end the wait without an error."""
+    with suppress(KeyboardInterrupt), _Interrupting():
+        threading.Event().wait()
+
+
 class EndingSignals(EndSignalHandler):
     """A context in which Ctrl-C, SIGTERM and SIGHUP interrupt in the same way.
 

@@ -1,8 +1,6 @@
 """The scene of messages, of what estimators and missions show, and of a recorded run. 1 s."""
 
 import math
-from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -11,11 +9,12 @@ from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.tlog import TlogReader
 from estimators.logs import open_log
 from estimators.messages import read_message
-from estimators.scene.estimates import items_of_estimates
+from estimators.scene.estimates import items_of
 from estimators.scene.messages import MessageScene
+from estimators.scene.placing import placed
 from estimators.scene.recording import SUFFIX, SceneWriter, read_scene
 from estimators.scene.scene import Scene, entries_of_log
-from estimators.scene.shown import Showing, Shown, Subject, placed
+from estimators.scene.shown import Estimates, Showing, Shown, Subject
 from estimators.scene_items import (
     Camera,
     Cleared,
@@ -110,10 +109,10 @@ def test_messages_become_places_with_attitude_errors_with_bands_plans_and_events
     assert scene["vehicles/1/speed/ground"][-1].item.value == pytest.approx(5.0)
     assert scene["targets/1/truth"][0].item.pos_ned_m == pytest.approx((0.0, 0.0, -10.0))
     assert [entry.item.text for entry in scene["vehicles/1/gps/fix"]] == [
-        *("GPS: 3D fix", "GPS: fix lost", "GPS: 3D fix")
+        *("GPS: 3D fix", "GPS: no fix", "GPS: 3D fix")
     ]
     assert scene["vehicles/1/texts"][0].item == Text(text="Low battery", warning=True)
-    assert [entry.item.text for entry in scene["vehicles/1/mode"]][1:] == ["armed", "disarmed"]
+    assert [entry.item.text for entry in scene["vehicles/1/armed"]] == ["armed", "disarmed"]
     waypoints = scene["vehicles/1/waypoints"][-1].item.points_ned_m
     assert waypoints.shape == (3, 3) and np.allclose(waypoints[:, 2], -20.0)
     fence = scene["vehicles/1/fence/0"][0].item
@@ -223,16 +222,16 @@ def test_items_get_their_place_from_vehicles_and_origins(log):
         None,
         Relative(item=Pose(pos_ned_m=(5.0, 0.0, 10.0)), system_id=1),
     )
-    assert placed(relative, messages) is None  # nothing was received yet
+    assert placed(relative, messages) == []  # nothing was received yet
     for _, frame in TlogReader(log):
         message = read_message(frame)
         messages.take(time.stamp(message), message)
-    entry = placed(relative, messages)
-    assert entry is not None and entry.path == "mission/target"
+    (entry,) = placed(relative, messages)
+    assert entry.path == "mission/target"
     assert entry.item.pos_ned_m == pytest.approx((103.0, 0.0, 0.0), abs=0.1)  # from the true place
     elsewhere = GeodeticPosition(lat_deg=HOME.lat_deg + 1e-3, lon_deg=HOME.lon_deg, alt_m=HOME.alt_m)
-    moved = placed(Shown(Subject(base="m"), "p", 1, elsewhere, Pose(pos_ned_m=(0.0, 0.0, 0.0))), messages)
-    assert moved is not None and moved.item.pos_ned_m[0] == pytest.approx(111.2, abs=0.3)
+    (moved,) = placed(Shown(Subject(base="m"), "p", 1, elsewhere, Pose(pos_ned_m=(0.0, 0.0, 0.0))), messages)
+    assert moved.item.pos_ned_m[0] == pytest.approx(111.2, abs=0.3)
 
 
 def test_what_a_run_showed_is_on_the_scene_of_its_log(log):
@@ -247,21 +246,11 @@ def test_what_a_run_showed_is_on_the_scene_of_its_log(log):
     assert "mission/grid" not in scene.at(400_000)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Estimate:
-    COLUMNS: ClassVar = (
-        *("north_m", "east_m", "north_sigma_m", "east_sigma_m", "north_east_correlation"),
-        *("roll_rad", "roll_variance_rad2"),
-    )
-    time_us: int = 1
-    subject: int = 1
-
-    def row(self):
-        return (10.0, 20.0, 2.0, 1.0, 0.5, 0.1, 0.0004)
-
-
 def test_estimates_are_shown_by_the_names_of_their_columns():
-    items = items_of_estimates([Estimate()], {"roll_rad": 0.05})
+    columns = ("north_m", "east_m", "north_sigma_m", "east_sigma_m", "north_east_correlation")
+    values = np.array([[10.0, 20.0, 2.0, 1.0, 0.5, 0.1, 0.0004]])
+    columns += ("roll_rad", "roll_variance_rad2")
+    items = items_of(Estimates(columns=columns, values=values, of_set=False, system_id=1), {"roll_rad": 0.05})
     place = items["place"]
     assert isinstance(place, Gaussian) and place.mean_ned_m == (10.0, 20.0, 0.0)
     assert np.allclose(place.covariance_m2, [[4.0, 1.0], [1.0, 1.0]])

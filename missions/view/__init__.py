@@ -1,0 +1,1 @@
+"""Viewers of a scene (`estimators.scene`): Rerun, live and as a file, and Foxglove."""
