@@ -46,6 +46,7 @@ FLOORS = (
     ("base", "search"),
     ("flown", "planning", "teams", "preflight"),
     ("vehicle", "patterns"),
+    ("view",),
     ("errors", "gps_off", "how_left", "kind", "process"),
 )
 MOST_LAZY_IMPORTS = 20  # inside functions of `missions`; it goes down only
@@ -408,8 +409,11 @@ def test_only_the_command_line_knows_options():
     def options(name):
         return [text for text in texts(source_of(name)) if FLAG.search(text)]
 
-    program = "autopilot_bridge.firmware_process.ardupilot"  # the command line of ArduPilot's program
-    assert found_by_module(options, without=("missions.cli", program)) == {}
+    programs = (  # the command lines of other programs
+        "autopilot_bridge.firmware_process.ardupilot",
+        *("missions.view.rerun_process", "missions.view.rerun_viewers"),
+    )
+    assert found_by_module(options, without=("missions.cli", *programs)) == {}
 
 
 def test_the_test_sees_options():

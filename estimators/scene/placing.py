@@ -1,11 +1,66 @@
 """Gives what is shown its place on the scene, by what the messages say about vehicles and origins."""
 
+import numpy as np
+
+from estimators.messages import Message
+from estimators.observations import Image
 from estimators.scene.estimates import items_of
 from estimators.scene.messages import MessageScene
 from estimators.scene.shown import Estimates, Shown
-from estimators.scene_items import Entry, Item, Placed, Relative
+from estimators.scene_items import Camera, Entry, Item, Picture, Placed, Relative
 
-__all__ = ["placed"]
+__all__ = ["Assembly", "placed"]
+
+
+class Assembly:
+    """Assembles a scene of messages and of what is shown, in the order in which they come.
+
+    What is shown before the scene has an origin waits for it.
+    """
+
+    def __init__(self) -> None:
+        self._messages = MessageScene()
+        self._waiting: list[Shown] = []
+
+    @property
+    def newest_us(self) -> int:
+        """Newest time of a message, on the timeline."""
+        return self._messages.timeline.newest_us
+
+    def take(self, time_us: int, message: Message) -> list[Entry]:
+        """The entries of a message at a vehicle time, and of what has waited for it."""
+        entries = self._messages.take(time_us, message)
+        if self._waiting and self._messages.origin is not None:
+            waiting, self._waiting = self._waiting, []
+            for shown in waiting:
+                entries += placed(shown, self._messages)
+        return entries
+
+    def show(self, shown: Shown) -> list[Entry]:
+        """The entries of what is shown."""
+        if self._messages.origin is None:
+            self._waiting.append(shown)
+            return []
+        return placed(shown, self._messages)
+
+    def image(self, image: Image) -> list[Entry]:
+        """The entries of a camera's image: the picture, and the camera where its place is known."""
+        path = f"vehicles/{image.src_system}/camera"
+        time_us = self._messages.timeline.common_us(image.time_us, image.src_system)
+        found = [Entry(f"{path}/picture", time_us, Picture(pixels=image.pixels))]
+        if np.isfinite([*image.pos_ned_m, *image.q_ned_from_camera]).all():
+            height_px, width_px = image.pixels.shape[:2]
+            camera = Camera(
+                pos_ned_m=image.pos_ned_m,
+                q_ned_from_camera=image.q_ned_from_camera,
+                width_px=width_px,
+                height_px=height_px,
+                focal_px=image.focal_px,
+                centre_px=image.centre_px,
+                distortion=image.distortion,
+            )
+            found.insert(0, Entry(path, time_us, camera))
+        return found
 
 
 def placed(shown: Shown, messages: MessageScene) -> list[Entry]:

@@ -4,19 +4,17 @@ from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from estimators.observations import Image, observations_beside, read_observations
 from estimators.scene.messages import ORIGIN, MessageScene
-from estimators.scene.placing import placed
+from estimators.scene.placing import Assembly
 from estimators.scene.recording import read_scene, scene_beside
 from estimators.scene.shown import Shown
-from estimators.scene_items import Camera, Entry, Origin, Picture, Placed
+from estimators.scene_items import Entry, Origin, Placed
 
 if TYPE_CHECKING:
     from estimators.logs import Log
 
-__all__ = ["Scene", "entries_of_image", "entries_of_log"]
+__all__ = ["Scene", "entries_of_log"]
 
 
 class Scene:
@@ -78,59 +76,23 @@ def entries_of_log(log: "Log", extra: Iterable[Shown] = ()) -> Iterator[Entry]:
         log: an open log: .tlog, .bin or .ulg.
         extra: what else is shown, in the order of time, such as by estimators that are run over it.
     """
-    messages = MessageScene()
+    scene = Assembly()
     beside = scene_beside(log.path)
     pending = sorted([*(read_scene(beside) if beside else ()), *extra], key=lambda shown: shown.time_us)
-    yield from _merged(log, messages, pending)
+    names = sorted({key.name for key in log.keys} & MessageScene.NAMES)
+    done = 0
+    for time_us, message in log.messages(names):
+        yield from scene.take(time_us, message)
+        while done < len(pending) and pending[done].time_us <= scene.newest_us:
+            yield from scene.show(pending[done])
+            done += 1
+    for shown in pending[done:]:
+        yield from scene.show(shown)
     images = observations_beside(log.path)
     if images is not None:
         for _, image in read_observations(images, (Image,)):
             assert isinstance(image, Image)
-            yield from entries_of_image(image, messages)
-
-
-def _merged(log: "Log", messages: MessageScene, pending: list[Shown]) -> Iterator[Entry]:
-    names = sorted({key.name for key in log.keys} & messages.NAMES)
-    waiting: list[Shown] = []  # until it is known where they are
-    done = 0
-    for time_us, message in log.messages(names):
-        yield from messages.take(time_us, message)
-        while done < len(pending) and pending[done].time_us <= messages.timeline.newest_us:
-            waiting.append(pending[done])
-            done += 1
-        if waiting:
-            yield from _placed_of(waiting, messages)
-    waiting += pending[done:]
-    yield from _placed_of(waiting, messages)
-
-
-def _placed_of(waiting: list[Shown], messages: MessageScene) -> Iterator[Entry]:
-    """The entries of those whose place is known; the others remain."""
-    if messages.origin is None:
-        return
-    for shown in waiting:
-        yield from placed(shown, messages)
-    waiting.clear()
-
-
-def entries_of_image(image: Image, messages: MessageScene) -> list[Entry]:
-    """A camera's image, and the camera where its place is known."""
-    path = f"vehicles/{image.src_system}/camera"
-    time_us = messages.timeline.common_us(image.time_us, image.src_system)
-    found = [Entry(f"{path}/picture", time_us, Picture(pixels=image.pixels))]
-    if np.isfinite([*image.pos_ned_m, *image.q_ned_from_camera]).all():
-        height_px, width_px = image.pixels.shape[:2]
-        camera = Camera(
-            pos_ned_m=image.pos_ned_m,
-            q_ned_from_camera=image.q_ned_from_camera,
-            width_px=width_px,
-            height_px=height_px,
-            focal_px=image.focal_px,
-            centre_px=image.centre_px,
-            distortion=image.distortion,
-        )
-        found.insert(0, Entry(path, time_us, camera))
-    return found
+            yield from scene.image(image)
 
 
 def _time_us(entry: Entry) -> int:

@@ -11,6 +11,7 @@ from missions.base.options import FlightOptions, MissionOptions
 from missions.base.run_options import RunOptions
 from missions.errors import PlanError
 from missions.vehicle.limits import FORECAST_WIND_M_S
+from missions.view.viewer import Viewer
 
 if TYPE_CHECKING:
     from autopilot_bridge.firmware_process.build import FirmwareBuild
@@ -46,6 +47,8 @@ class RunRequest(RunOptions):
         on_open: called once the links or the world are open.
         on_remark: receives what a user should know before the flight, one sentence each.
         command: the command line, for the summary.
+        view: an open viewer (`missions.view.opening.open_viewer`) that shows the flight, while it is flown
+            or, for a file, when it is over; the caller closes it. None: no viewer.
         signing_key: signing key, shared with vehicles that are not embedded; None: no signing.
     """
 
@@ -66,6 +69,7 @@ class RunRequest(RunOptions):
     on_open: Callable[[], object] = lambda: None
     on_remark: Callable[[str], object] = lambda _text: None
     command: str = ""
+    view: Viewer | None = None
     signing_key: SigningKey | None = None
 
     @property

@@ -23,6 +23,7 @@ from missions.cli.fly_command import (
 from missions.cli.later import body_in
 from missions.cli.options import FIRMWARE_HELP, STRICT_HELP, WORLD_HELP
 from missions.cli.signing import key_option
+from missions.cli.view_option import view_option
 
 _BODIES: Final = "missions.cli.bodies.fly"
 _link = partial(flight_option, group=VEHICLES)
@@ -83,6 +84,7 @@ options)`. The run folder gets flight.tlog, summary.json and track.png.
     metavar="FILE",
     help="File for the mission that would be uploaded (.plan, .waypoints), in place of a flight.",
 )
+@view_option(_results)
 @_results("--no-picture", is_flag=True, help="No picture track.png.")
 @body_in(_BODIES)
 def fly() -> None: ...

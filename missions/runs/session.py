@@ -6,11 +6,14 @@ This module opens the world or the links, starts the event loop, and reads the w
 import asyncio
 from dataclasses import dataclass, field, replace
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 from autopilot_bridge.clock import unix_time_us
 from autopilot_bridge.clock.pacing import wall_time_s
 from autopilot_bridge.errors import BridgeError
+from estimators.errors import LogError
+from estimators.logs import open_log
 from missions.base.mission import Mission
 from missions.base.report import Report
 from missions.base.request import RunRequest
@@ -44,7 +47,11 @@ from missions.runs.results import (
     title,
 )
 from missions.runs.run import Run
+from missions.runs.scene import FlightScene
 from missions.runs.vehicle_opening import VehicleOpener
+from missions.view.feed import SceneFeed
+from missions.view.of_log import draw_log
+from missions.view.viewer import Viewer, ViewError
 
 __all__ = ["COMPLETED", "FAILED", "INTERRUPTED", "Flight", "RunRequest", "RunResult", "afly", "fly"]
 
@@ -164,16 +171,19 @@ def _fly_interruptible(
             stage.loop.close()
         claimed.give_back()
         raise
-    flight = Flight()
+    flight, view = Flight(), request.view
     outcome, reason, by_signal = COMPLETED, "", 0
     try:
         recorder = FlightRecorder(claimed.log, epoch_us=stage.epoch_us, unix_time_us=unix_time_us)
         flight.recorder = recorder
-        tap = recorder if estimators is None else estimators.around(recorder, folder / LOG_NAME)
-        stage.on_truth(tap.record_truth)
+        inner = recorder if estimators is None else estimators.around(recorder, folder / LOG_NAME)
+        fleet = None if estimators is None else estimators.fleet
+        feed = None if view is None or not view.live else SceneFeed(view, folder.name)
+        scene = FlightScene(inner, flight, fleet, folder / LOG_NAME, feed)
+        stage.on_truth(scene.record_truth)
         try:
             ending.run(
-                fly_vehicles(mission, request, stage, tap, flight, estimators, on_progress), stage.loop
+                fly_vehicles(mission, request, stage, scene, flight, estimators, on_progress), stage.loop
             )
         except KeyboardInterrupt as interrupt:
             outcome, reason, by_signal = INTERRUPTED, INTERRUPTED, signal_of(interrupt)
@@ -184,6 +194,7 @@ def _fly_interruptible(
         finally:
             flight.note_how_left()
             recorder.close()
+            scene.close()
     finally:
         stage.close()
         stage.loop.close()
@@ -224,6 +235,8 @@ def _fly_interruptible(
         summary |= {"outcome": outcome, "reason": reason}
         if written:
             replace_summary(folder, summary)
+    if view is not None and not view.live:
+        outcome, reason = _drawn(view, folder, outcome, reason)
     return RunResult(
         outcome=outcome,
         reason=reason,
@@ -233,6 +246,15 @@ def _fly_interruptible(
         signal=by_signal,
         left=tuple(notes.left for notes, _ in debriefing.flights if notes.left is not None),
     )
+
+
+def _drawn(view: Viewer, folder: Path, outcome: str, reason: str) -> tuple[str, str]:
+    """Draw the flight on a viewer of recorded flights; returns outcome and reason of the run."""
+    try:
+        draw_log(open_log(folder / LOG_NAME), view, folder.name)
+    except (ViewError, LogError, OSError) as error:
+        return FAILED, "; ".join(filter(None, (reason, f"the flight was not drawn: {error}")))
+    return outcome, reason
 
 
 def _estimator_files(

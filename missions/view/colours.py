@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.scene_items import Placed, Role
+from estimators.scene_items import Origin, Placed, Role
 
 __all__ = ["Colour", "colour_of", "colour_scale"]
 
@@ -32,9 +32,10 @@ _OF_VEHICLES: Final[tuple[Colour, ...]] = (
 def colour_of(path: str, item: Placed) -> Colour:
     """Colour of an item: of its role, and of its vehicle what a vehicle reports."""
     parts = path.split("/")
-    if parts[0] == "vehicles" and item.role is Role.ESTIMATE and parts[1].isdigit():
+    role = Role.ESTIMATE if isinstance(item, Origin) else item.role
+    if parts[0] == "vehicles" and role is Role.ESTIMATE and parts[1].isdigit():
         return _OF_VEHICLES[(int(parts[1]) - 1) % len(_OF_VEHICLES)]
-    return _OF_ROLE[item.role]
+    return _OF_ROLE[role]
 
 
 def colour_scale(values: NDArray[np.floating], low: float, high: float) -> NDArray[np.uint8]:

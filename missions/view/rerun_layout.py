@@ -1,7 +1,7 @@
 """The layout of Rerun's views, from what a scene has."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, Final
 
 import rerun.blueprint as rrb
@@ -13,6 +13,9 @@ __all__ = ["Content", "layout"]
 
 _MOST_PLOTS: Final = 6  # in a tab
 _MARGIN: Final = 1.25
+_WHOLE: Final = rrb.TimeAxis(
+    view_range=rrb.TimeRange(start=rrb.TimeRangeBoundary.infinite(), end=rrb.TimeRangeBoundary.infinite())
+)
 
 
 @dataclass(slots=True)
@@ -32,18 +35,14 @@ class Content:
     places: set[str] = field(default_factory=set)
     trails: set[str] = field(default_factory=set)
     pictures: set[str] = field(default_factory=set)
-    series: dict[str, Value] = field(default_factory=dict)
     bands: set[str] = field(default_factory=set)
     states: set[str] = field(default_factory=set)
     texts: set[str] = field(default_factory=set)
+    series: dict[str, Value] = field(default_factory=dict)
 
     def copy(self) -> "Content":
         """The same, which does not grow."""
-        return Content(
-            *(set(own) for own in (self.places, self.trails, self.pictures)),
-            dict(self.series),
-            *(set(own) for own in (self.bands, self.states, self.texts)),
-        )
+        return replace(self, **{item.name: getattr(self, item.name).copy() for item in fields(self)})
 
     def __bool__(self) -> bool:
         return bool(self.places or self.series or self.texts or self.pictures)
@@ -67,8 +66,10 @@ def layout(content: Content, timeline: str, extent: tuple[Vector, Vector] | None
         right.append(rrb.Tabs(*_plots(content)))
         shares.append(4.0)
     if content.states:
-        right.append(rrb.StateTimelineView(contents=sorted(content.states), name="modes and phases"))
-        shares.append(1.2)
+        right.append(
+            rrb.StateTimelineView(contents=sorted(content.states), name="modes and phases", time_view=_WHOLE)
+        )
+        shares.append(2.0)
     if content.texts:
         right.append(rrb.TextLogView(contents=sorted(content.texts), name="events"))
         shares.append(1.3)
@@ -130,6 +131,7 @@ def _plots_of(by_unit: Mapping[str, Sequence[str]], content: Content) -> list[An
                 contents=[*paths, *bands],
                 name=f"{name}, {unit}" if has_unit else name,
                 plot_legend=rrb.Corner2D.LeftTop,
+                axis_x=_WHOLE,
             )
         )
     return views

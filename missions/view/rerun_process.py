@@ -1,5 +1,4 @@
-"""Rerun's viewer as a process of its own, which listens on this machine only and sends no usage statistics.
-"""
+"""Rerun's viewer as a process of its own. It listens on this machine only and sends no statistics."""
 
 import importlib.util
 import json

@@ -42,6 +42,8 @@ class RerunFile:
         ViewError: the file exists, or can't be written.
     """
 
+    live = False
+
     def __init__(self, path: Path) -> None:
         self.where = str(path)
         self._path = path
@@ -78,6 +80,7 @@ class RerunFile:
 class _Live:
     """A viewer in a process of its own."""
 
+    live = True
     where = ""
 
     def __init__(self, process: ViewerProcess) -> None:

@@ -41,11 +41,6 @@ class ViewTarget:
     path: Path | None = None
     port: int | None = None
 
-    @property
-    def live(self) -> bool:
-        """It shows what happens while it happens; a file is written when the run is over."""
-        return self.path is None
-
 
 def parse_view(text: str) -> ViewTarget:
     """The viewer that a text names.

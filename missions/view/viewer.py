@@ -17,8 +17,12 @@ class Viewer(Protocol):
     """Draws a scene.
 
     Attributes:
+        live: it shows a flight while it is flown; else the flight is drawn when it is over.
         where: what the user does to see it, or where the file is: "http://127.0.0.1:9090/...".
     """
+
+    @property
+    def live(self) -> bool: ...
 
     @property
     def where(self) -> str: ...

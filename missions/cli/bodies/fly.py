@@ -19,6 +19,7 @@ from missions.cli.bodies.confirm import confirmation
 from missions.cli.bodies.fly_report import KILLED, ProgressLine, leave_closed_terminal, print_result
 from missions.cli.bodies.params import known_to_all
 from missions.cli.bodies.signing import key_from, warn_if_open
+from missions.cli.bodies.viewing import viewing
 from missions.cli.bodies.world import firmware_of, world_of
 from missions.cli.declared_options import chosen_names, specified
 from missions.cli.fly_command import refuse_idle_options
@@ -30,6 +31,7 @@ from missions.process.ending import signal_of
 from missions.runs.plan_export import export_plan
 from missions.runs.session import fly as fly_mission
 from missions.vehicle.connection import ONBOARD_COMPUTER
+from missions.view.viewer import Viewer, ViewError
 
 _NAMES_SHOWN: Final = 20  # names of parameters that were left out; the summary has all
 _FORECAST_HEIGHT_M: Final = 100.0  # lower limit; above it the wind of a profile increases little
@@ -129,6 +131,18 @@ def _fly(given: dict[str, Any]) -> int:
     if request.left_out_parameters:
         report(f"--params: {left_out(request.left_out_parameters, _NAMES_SHOWN)}")
 
+    if given["export_plan"] is not None and given["view"] is not None:
+        raise click.UsageError("--view: has no effect with --export-plan, which flies nothing; leave it out")
+    try:
+        with viewing(given["view"]) as view:
+            return _fly_viewed(given, mission, request, view)
+    except ViewError as error:
+        raise click.ClickException(in_options(error)) from error
+
+
+def _fly_viewed(
+    given: dict[str, Any], mission: Mission[Any], request: RunRequest, view: Viewer | None
+) -> int:
     line = ProgressLine()
     if given["export_plan"] is None:
         line.start(mission.name, given["connect"])
@@ -156,6 +170,7 @@ def _fly(given: dict[str, Any]) -> int:
             on_open=opened,
             command=" ".join(["flightstack", *sys.argv[1:]]),
             signing_key=key,
+            view=view,
         )
         if given["export_plan"] is not None:
             return _export(mission, request, given["export_plan"])

@@ -2,9 +2,8 @@
 
 from collections.abc import Callable, Sequence
 from functools import partial
-from itertools import islice
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import click
 
@@ -15,19 +14,16 @@ from estimators.library import estimator_class, parameters_from
 from estimators.logs import Log, open_log
 from estimators.logs.dialect import load_dialect
 from estimators.scene.of_estimators import shown_by_estimator
-from estimators.scene.scene import entries_of_log
 from estimators.scene.shown import Shown
-from estimators.scene_items import Origin
 from missions.cli.exit_codes import FAILED
 from missions.cli.options import in_options, report
 from missions.errors import PlanError
 from missions.flown.run_folder import LOG_NAME
 from missions.process.ending import wait_for_interrupt
+from missions.view.of_log import draw_log
 from missions.view.opening import open_viewer, require_library
 from missions.view.target import SERVED, ViewTarget, parse_view
-from missions.view.viewer import Viewer, ViewError
-
-_AT_ONCE: Final = 5000  # entries
+from missions.view.viewer import ViewError
 
 
 def view(
@@ -84,9 +80,8 @@ def _show(logs: Sequence[Log], where: ViewTarget, make: Callable[[], Estimator[A
     viewer = open_viewer(where)
     try:
         for log, extra in zip(logs, extras, strict=True):
-            viewer.begin(_title(log))
-            _draw(log, viewer, extra)
-            viewer.finish()
+            if not draw_log(log, viewer, _title(log), extra):
+                click.echo(f"{log.path} has no position, so that there is no map", err=True)
         click.echo(f"view: {viewer.where}")
         if where.kind in SERVED:
             wait_for_interrupt()
@@ -101,13 +96,3 @@ def _extras(logs: Sequence[Log], make: Callable[[], Estimator[Any]] | None) -> l
     if make().TEAM:
         return [shown_by_estimator(logs, make), *([] for _ in logs[1:])]
     return [shown_by_estimator([log], make) for log in logs]
-
-
-def _draw(log: Log, viewer: Viewer, extra: Sequence[Shown]) -> None:
-    has_place = False
-    entries = entries_of_log(log, extra)
-    while some := list(islice(entries, _AT_ONCE)):
-        has_place = has_place or any(isinstance(entry.item, Origin) for entry in some)
-        viewer.draw(some)
-    if not has_place:
-        click.echo(f"{log.path} has no position, so that there is no map", err=True)
