@@ -1,7 +1,7 @@
 """Opens viewers. What they need is imported here, when one is opened."""
 
 import importlib
-import importlib.util
+from importlib.util import find_spec
 from typing import Any, Final
 
 from missions.view.target import ViewKind, ViewTarget
@@ -22,7 +22,7 @@ def require_library(target: ViewTarget) -> None:
         ViewError: it is not.
     """
     library = _LIBRARIES[target.kind]
-    if importlib.util.find_spec(library) is None:
+    if find_spec(library) is None:
         raise ViewError(f"`view` needs {library}, which is not installed; pip install 'flightstack[view]'")
 
 

@@ -11,6 +11,7 @@ from typing import Any, Final
 import cv2
 import numpy as np
 import rerun as rr
+from numpy.typing import NDArray
 
 from estimators.received import GAP_S
 from estimators.scene_items import (
@@ -33,7 +34,7 @@ from missions.view.colours import colour_of, colour_scale
 from missions.view.rerun_layout import Content, layout
 from missions.view.words import field_label, gaussian_label, series_name
 
-__all__ = ["TIMELINE", "RerunDrawer"]
+__all__ = ["TIMELINE", "RerunDrawer", "field_image"]
 
 TIMELINE: Final = "time"
 TRAIL: Final = "trail"
@@ -234,8 +235,7 @@ class RerunDrawer:
         corners = [(item.south_m, item.west_m, item.down_m)]
         corners.append((item.south_m + rows * item.cell_m, item.west_m + columns * item.cell_m, item.down_m))
         self._take_all(np.array(corners))
-        # An image's rows go down from its top: x (north) is along a row, y (east) from the last row up.
-        image = np.ascontiguousarray(colour_scale(item.values, *item.scale).transpose(1, 0, 2)[::-1])
+        image = field_image(item)
         self._recording.log(
             path,
             rr.GridMap(
@@ -339,6 +339,13 @@ class RerunDrawer:
         if len(known):
             self._extent.take(*known.min(axis=0).tolist())
             self._extent.take(*known.max(axis=0).tolist())
+
+
+def field_image(item: Field) -> NDArray[np.uint8]:
+    """The image of a field, RGBA, (columns, rows, 4): x (north) is along its rows, y (east) goes up from its
+    last row.
+    """
+    return np.ascontiguousarray(colour_scale(item.values, *item.scale).transpose(1, 0, 2)[::-1])
 
 
 def _xyzw(q: Quaternion) -> rr.Quaternion:
