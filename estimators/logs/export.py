@@ -131,59 +131,69 @@ def _mcap(log: Log, selections: Sequence[Selection], path: Path, si: bool) -> li
     with new_file(path) as part, open(part, "wb") as file:
         writer = Writer(file)
         writer.start(profile="", library="flightstack")
-        channels = {}
-        in_si: dict[tuple[str, int, int], dict[str, tuple[str, float]]] = {}
-        for stream, _ in selections:
-            units = stream.description.units
-            converted = {field: to_si(unit) for field, unit in units.items()} if si else {}
-            in_si[stream.name, stream.system_id, stream.component_id] = names = {
-                field: (name_in_si(field, units[field]), factor) for field, (factor, _) in converted.items()
-            }
-            schema = {
-                "title": stream.name,
-                "type": "object",
-                "properties": {
-                    names.get(field.name, (field.name, 1.0))[0]: _json_type(
-                        field.code,
-                        field.length,
-                        converted[field.name][1] if field.name in converted else units.get(field.name, ""),
-                        whole=field.name not in converted,
-                    )
-                    for field in stream.description.definition.wire_fields
-                },
-            }
-            prefix = "mavlink_si" if si else "mavlink"
-            number = writer.register_schema(
-                name=f"{prefix}.{stream.name}", encoding="jsonschema", data=json.dumps(schema).encode()
-            )
-            channels[stream.name, stream.system_id, stream.component_id] = writer.register_channel(
-                topic=f"/{stream.system_id}/{stream.component_id}/{stream.name}",
-                message_encoding="json",
-                schema_id=number,
-            )
-        counts = dict.fromkeys(channels, 0)
-        log_times = _log_times(log, selections)
-        for (time_us, message), log_time_us in zip(
-            messages_in_order(log.source, selections), log_times, strict=True
-        ):
-            key = message.name, message.src_system, message.src_component
-            fields = {
-                name.rstrip("_"): _plain(value)
-                for name, value in zip(message._fields, message, strict=True)
-                if name not in SOURCE_FIELDS
-            }
-            for name, (name_of_si, factor) in in_si[key].items():
-                fields[name_of_si] = _scaled(fields.pop(name), factor)
-            writer.add_message(
-                channel_id=channels[key],
-                log_time=_nanoseconds(log_time_us or time_us),
-                publish_time=_nanoseconds(time_us),
-                sequence=counts[key],
-                data=json.dumps(fields).encode(),
-            )
-            counts[key] += 1
+        write_mcap_messages(writer, log, selections, si=si)
         writer.finish()
     return [path]
+
+
+def write_mcap_messages(writer: Any, log: Log, selections: Sequence[Selection], *, si: bool) -> None:
+    """Write messages of a log as JSON with a schema for each kind.
+
+    Args:
+        writer: a started `mcap.writer.Writer`.
+        log, selections, si: as for `export`.
+    """
+    channels = {}
+    in_si: dict[tuple[str, int, int], dict[str, tuple[str, float]]] = {}
+    for stream, _ in selections:
+        units = stream.description.units
+        converted = {field: to_si(unit) for field, unit in units.items()} if si else {}
+        in_si[stream.name, stream.system_id, stream.component_id] = names = {
+            field: (name_in_si(field, units[field]), factor) for field, (factor, _) in converted.items()
+        }
+        schema = {
+            "title": stream.name,
+            "type": "object",
+            "properties": {
+                names.get(field.name, (field.name, 1.0))[0]: _json_type(
+                    field.code,
+                    field.length,
+                    converted[field.name][1] if field.name in converted else units.get(field.name, ""),
+                    whole=field.name not in converted,
+                )
+                for field in stream.description.definition.wire_fields
+            },
+        }
+        prefix = "mavlink_si" if si else "mavlink"
+        number = writer.register_schema(
+            name=f"{prefix}.{stream.name}", encoding="jsonschema", data=json.dumps(schema).encode()
+        )
+        channels[stream.name, stream.system_id, stream.component_id] = writer.register_channel(
+            topic=f"/{stream.system_id}/{stream.component_id}/{stream.name}",
+            message_encoding="json",
+            schema_id=number,
+        )
+    counts = dict.fromkeys(channels, 0)
+    log_times = _log_times(log, selections)
+    for (time_us, message), log_time_us in zip(
+        messages_in_order(log.source, selections), log_times, strict=True
+    ):
+        key = message.name, message.src_system, message.src_component
+        fields = {
+            name.rstrip("_"): _plain(value)
+            for name, value in zip(message._fields, message, strict=True)
+            if name not in SOURCE_FIELDS
+        }
+        for name, (name_of_si, factor) in in_si[key].items():
+            fields[name_of_si] = _scaled(fields.pop(name), factor)
+        writer.add_message(
+            channel_id=channels[key],
+            log_time=_nanoseconds(log_time_us or time_us),
+            publish_time=_nanoseconds(time_us),
+            sequence=counts[key],
+            data=json.dumps(fields).encode(),
+        )
+        counts[key] += 1
 
 
 def _log_times(log: Log, selections: Sequence[Selection]) -> list[int]:

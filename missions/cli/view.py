@@ -14,7 +14,7 @@ _BODIES: Final = "missions.cli.bodies.view"
 
 @click.command()
 @click.argument("paths", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="RUN|LOG...")
-@click.option("--view", "target", default="window", show_default=True, metavar="WHERE", help=VIEW_HELP)
+@click.option("--view", "target", metavar="WHERE", help=f"{VIEW_HELP} [default: window]")
 @click.option(
     "--estimator",
     metavar="NAME|FILE.py",

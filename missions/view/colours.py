@@ -41,7 +41,7 @@ def colour_of(path: str, item: Placed) -> Colour:
 def colour_scale(values: NDArray[np.floating], low: float, high: float) -> NDArray[np.uint8]:
     """Colours (..., 4), RGBA, of values between two ends, dark to bright; not a number: transparent.
 
-    They are those of viridis, which are told apart by all eyes.
+    They are those of viridis, which all eyes distinguish.
     """
     known = np.isfinite(values)
     share = np.clip((np.where(known, values, low) - low) / (high - low), 0.0, 1.0)

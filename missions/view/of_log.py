@@ -27,7 +27,7 @@ def draw_log(log: Log, viewer: Viewer, title: str, extra: Sequence[Shown] = ()) 
     Returns:
         Whether a place is known, so that there is a map.
     """
-    viewer.begin(title)
+    viewer.begin(title, log)
     has_place = False
     entries = entries_of_log(log, extra)
     while some := list(islice(entries, _AT_ONCE)):

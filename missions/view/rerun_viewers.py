@@ -9,6 +9,7 @@ from typing import Final
 
 import rerun as rr
 
+from estimators.logs import Log
 from estimators.scene_items import Entry
 from missions.view.rerun_drawer import RerunDrawer
 from missions.view.rerun_page import PageServer
@@ -54,7 +55,7 @@ class RerunFile:
                 f"can't write {path}: {error.strerror}; choose another file for `view`"
             ) from error
 
-    def begin(self, title: str) -> None:
+    def begin(self, title: str, log: Log | None = None) -> None:
         """Begin the one recording of the file."""
         self._recording = _recording(title)
         self._recording.save(self._path)
@@ -86,7 +87,7 @@ class _Live:
     def __init__(self, process: ViewerProcess) -> None:
         self._process = process
 
-    def begin(self, title: str) -> None:
+    def begin(self, title: str, log: Log | None = None) -> None:
         """Begin a recording."""
         self._recording = _recording(title)
         self._recording.connect_grpc(self._process.url)

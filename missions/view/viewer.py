@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from typing import Protocol
 
+from estimators.logs import Log
 from estimators.scene_items import Entry
 from missions.errors import MissionError
 
@@ -27,8 +28,13 @@ class Viewer(Protocol):
     @property
     def where(self) -> str: ...
 
-    def begin(self, title: str) -> None:
-        """Begin a recording, to which what is drawn from now on belongs."""
+    def begin(self, title: str, log: Log | None = None) -> None:
+        """Begin a recording, to which what is drawn from now on belongs.
+
+        Args:
+            title: of the recording.
+            log: whose scene is drawn; None: a flight is in progress.
+        """
         ...
 
     def draw(self, entries: Sequence[Entry]) -> None:

@@ -22,16 +22,20 @@ from missions.flown.run_folder import LOG_NAME
 from missions.process.ending import wait_for_interrupt
 from missions.view.of_log import draw_log
 from missions.view.opening import open_viewer, require_library
-from missions.view.target import SERVED, ViewTarget, parse_view
+from missions.view.target import SERVED, ViewKind, ViewTarget, parse_view
 from missions.view.viewer import ViewError
 
 
 def view(
-    paths: Sequence[Path], target: str, estimator: str | None, settings: Sequence[str], dialect: str | None
+    paths: Sequence[Path],
+    target: str | None,
+    estimator: str | None,
+    settings: Sequence[str],
+    dialect: str | None,
 ) -> int:
     """`flightstack view`."""
     try:
-        where = parse_view(target)
+        where = parse_view(target or ViewKind.WINDOW)
         load_dialect(dialect)
         if settings and estimator is None:
             raise PlanError("`set` has no effect without `estimator`; give both, or leave it out")

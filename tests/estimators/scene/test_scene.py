@@ -197,6 +197,7 @@ def test_what_is_shown_is_read_back_from_the_file_of_the_run(tmp_path):
     assert [one[:4] for one in found] == [one[:4] for one in shown]
     assert Showing(Subject(base="mission")).changes(0, {"x": ITEMS[0]})
     for one, item in zip(found, ITEMS, strict=True):
+        assert not isinstance(one.item, Estimates)
         keeper = Showing(Subject(base="mission"))
         keeper.changes(0, {"x": item})
         assert keeper.changes(1, {"x": one.item}) == [], item

@@ -28,7 +28,7 @@ class Drawn:
     def __init__(self):
         self.entries, self.calls = [], []
 
-    def begin(self, title):
+    def begin(self, title, log=None):
         self.calls.append(f"begin {title}")
 
     def draw(self, entries):
