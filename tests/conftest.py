@@ -30,6 +30,9 @@ gc.set_threshold(YOUNG_OBJECTS)  # the collection of tests makes millions of obj
 sys.dont_write_bytecode = False
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
+# Flights of the command line write no page: it takes two seconds. Tests of the page ask for it.
+os.environ["FLIGHTSTACK_NO_REPORT"] = "1"
+
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption(

@@ -85,6 +85,12 @@ options)`. The run folder gets flight.tlog, summary.json and track.png.
     help="File for the mission that would be uploaded (.plan, .waypoints), in place of a flight.",
 )
 @view_option(_results)
-@_results("--no-picture", is_flag=True, help="No picture track.png.")
+@_results("--no-picture", is_flag=True, help="No picture track.png, and no page.")
+@_results(
+    "--no-report",
+    is_flag=True,
+    envvar="FLIGHTSTACK_NO_REPORT",
+    help="No page report.html. [default: one, where Bokeh is installed]",
+)
 @body_in(_BODIES)
 def fly() -> None: ...

@@ -22,7 +22,7 @@ from missions.process.supervision import supervised
 _COMMANDS: Final = {
     "fly": ("missions.cli.fly", "fly", "Fly a mission: on an embedded SITL, or on any vehicle."),
     "sitl": ("missions.cli.sitl", "sitl", "SITL for other people's clients."),
-    "report": ("missions.cli.report", "report", "Summary and picture from the log of a killed program."),
+    "report": ("missions.cli.report", "report", "Pages of runs and logs; results of a killed program."),
     "check": ("missions.cli.check", "check", "Runs and logs against limits, for continuous integration."),
     "log": ("missions.cli.log", "log", "Look into logs, and make others of them."),
     "view": ("missions.cli.view", "view", "Runs and logs in a viewer: vehicles, beliefs, errors, events."),

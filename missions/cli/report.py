@@ -1,4 +1,4 @@
-"""`flightstack report`: summary and picture of a flight from the log that is left."""
+"""`flightstack report`: pages of runs and logs, and the results of a program that was killed."""
 
 from pathlib import Path
 from typing import Final
@@ -11,17 +11,18 @@ _BODIES: Final = "missions.cli.bodies.report"
 
 
 @click.command()
-@click.argument("path", metavar="FOLDER|LOG", type=click.Path(path_type=Path))
+@click.argument("paths", nargs=-1, required=True, metavar="RUN|LOG...", type=click.Path(path_type=Path))
 @click.option(
     "--out",
     type=click.Path(path_type=Path),
     metavar="FOLDER",
-    help="Folder for the results of a LOG. [default: runs/LOG-N]",
+    help="Folder for the results of a LOG, or of a comparison. [default: runs/LOG-N, runs/report-N]",
 )
-@click.option("--no-picture", is_flag=True, help="No picture track.png.")
+@click.option("--no-picture", is_flag=True, help="Summary only: no picture track.png, and no page.")
 @body_in(_BODIES)
 def report() -> None:
-    """Make summary.json and track.png of a flight whose program has crashed or was killed.
+    """Make the page report.html of a run or a log (.tlog, .bin, .ulg), or one that compares several.
 
-    FOLDER is its run folder, which is completed; LOG is a telemetry log. Nothing is overwritten.
+    A run folder whose program has crashed or was killed gets its summary.json and track.png, too, and so does
+    a telemetry log. Only the page replaces an earlier one.
     """

@@ -19,6 +19,7 @@ from missions.studies.folder import SUMMARY, RowWriter, StudyFolder
 from missions.studies.inline import Inline
 from missions.studies.job import Job
 from missions.studies.options import KeepLogs
+from missions.studies.page import REPORT, study_page
 from missions.studies.picture import draw_study
 from missions.studies.results import Results
 from missions.studies.study import Study, Trial, Trials
@@ -251,7 +252,9 @@ class _Session:
             self._folder.write(TABLE, ("\n".join(table) + "\n").encode())
             self._folder.write_json(SUMMARY, summary)
             if self._picture:
-                self._draw(results)
+                pictures = self._draw(results)
+                page = study_page(results, summary, table, pictures, outcome=outcome, reason=reason)
+                self._folder.write(REPORT, page.encode())
         except MissionError as error:
             outcome, reason = "failed", "; ".join(filter(None, (reason, str(error))))
         return StudyResult(
@@ -264,12 +267,15 @@ class _Session:
             signal=by_signal,
         )
 
-    def _draw(self, results: Results) -> None:
-
+    def _draw(self, results: Results) -> dict[str, bytes]:
+        """Write the pictures; returns them by name."""
+        drawn = {}
         with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as made:
             (draw_study if self._study.draw is None else self._study.draw)(results, Path(made))
             for path in sorted(Path(made).iterdir()):
-                self._folder.write(path.name, path.read_bytes())
+                drawn[path.name] = path.read_bytes()
+                self._folder.write(path.name, drawn[path.name])
+        return drawn
 
 
 def identity_of(trials: Trials, command: str, arguments: Mapping[str, Any] | None) -> dict[str, Any]:

@@ -36,8 +36,9 @@ def test_the_folder_of_a_killed_flight_is_completed_and_never_overwritten(killed
     assert summary["vehicles"][0]["error_reference"] == "truth"
     picture = (folder / "track.png").read_bytes()
     assert picture.startswith(b"\x89PNG")
-    assert run_command_line(["report", str(folder)]) == 1
-    assert "nothing is overwritten" in capsys.readouterr().err
+    assert (folder / "report.html").stat().st_size > 1_000_000
+    assert run_command_line(["report", str(folder)]) == 0  # only the page is made anew
+    assert capsys.readouterr().out == f"written: {folder / 'report.html'}\n"
     assert (folder / "flight.tlog").read_bytes() == log and (folder / "track.png").read_bytes() == picture
 
 

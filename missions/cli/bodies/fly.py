@@ -29,6 +29,7 @@ from missions.errors import MissionError, PlanError
 from missions.library import find_mission
 from missions.process.ending import signal_of
 from missions.runs.plan_export import export_plan
+from missions.runs.report_page import add_page
 from missions.runs.session import fly as fly_mission
 from missions.vehicle.connection import ONBOARD_COMPUTER
 from missions.view.viewer import Viewer, ViewError
@@ -184,4 +185,7 @@ def _fly_viewed(
         leave_closed_terminal()
         line.end()
     line.finish(result)
-    return print_result(result)
+    code = print_result(result)
+    if request.picture and not given["no_report"] and (left_out_page := add_page(result.folder)):
+        report(left_out_page)
+    return code

@@ -34,6 +34,7 @@ def test_the_run_folder_has_summary_table_and_figures(tmp_path: Path) -> None:
     assert sorted(path.name for path in out.iterdir()) == [
         "figure_6.png",
         "figure_7.png",
+        "report.html",
         "rows.parquet",
         "study.json",
         "summary.json",
@@ -131,7 +132,8 @@ def test_a_users_file_is_a_study(tmp_path: Path) -> None:
     assert code == 0 and err == ""
     assert "share  trials" in said and f"run: {out}" in said
     assert {path.name for path in out.iterdir()} == {
-        "rows.parquet", "study.json", "study.png", "summary.json", "table.txt", "timing.parquet",
+        *("report.html", "rows.parquet", "study.json", "study.png", "summary.json", "table.txt"),
+        "timing.parquet",
     }  # fmt: skip
     summary = json.loads((out / "summary.json").read_text())
     assert summary["outcome"] == "completed" and summary["seed"] == 2 and summary["trials"] == 8
