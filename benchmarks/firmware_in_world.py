@@ -35,7 +35,7 @@ MISSIONS: Final[Mapping[str, Mapping[str, tuple[str, ...]]]] = {
         "copter": ("--pattern", "L1", "--size", "60"),
         "plane": ("--pattern", "L1", "--size", "600"),
     },
-    "sector": {"copter": ("--size", "80"), "plane": ("--size", "800")},
+    "sector": {"copter": ("--size", "80"), "plane": ("--size", "1000")},
     "orbit": {"plane": ("--duration", "120")},
     "occupancy": {
         "copter": ("--size", "400", "--altitude", "50", "--identify", "bayes"),

@@ -38,7 +38,10 @@ MESSAGES: Final = (
 )
 _POSE_POSITION: Final = (0, 6, 11)  # diagonal of an upper-triangular 6x6 covariance, row by row
 _POSE_ATTITUDE: Final = (15, 18, 20)
-_HIGHRES_FIELDS_UPDATED: Final = 63  # accelerometer, gyro: what PX4's driver publishes together
+_INERTIAL_FIELDS: Final = 0x3F  # of HIGHRES_IMU.fields_updated: accelerometer and gyro, in every message
+_MAG_FIELDS: Final = 0x1C0
+_BARO_FIELDS: Final = 0x1A00  # pressure, pressure altitude, temperature
+_DIFFERENTIAL_FIELD: Final = 0x400
 _PLACE_SIZE: Final = 3  # latitude and longitude in degrees, altitude in metres
 _GYRO: Final[int] = interface.IMU_GYRO_FRD_RAD_S.start
 _ACCEL: Final[int] = interface.IMU_ACCEL_FRD_M_S2.start
@@ -55,6 +58,7 @@ def _fill(
     imu: Array,
     mag: Array,
     baro: Array,
+    pitot: Array,
     covariance: Array,
     place: Array,
     home_ned_m: Array,
@@ -103,6 +107,8 @@ def _fill(
     r.highres_imu__ymag = mag[_MAG + 1] if field_known else 0.0
     r.highres_imu__zmag = mag[_MAG + 2] if field_known else 0.0
     r.highres_imu__abs_pressure = baro[interface.BARO_PRESSURE_PA]  # in pascal, as PX4 fills it
+    difference_pa = pitot[interface.AIRSPEED_DIFFERENTIAL_PRESSURE_PA]
+    r.highres_imu__diff_pressure = difference_pa if difference_pa == difference_pa else 0.0
     r.highres_imu__pressure_alt = _pressure_altitude_m(max(0.0, baro[interface.BARO_PRESSURE_PA]))
     r.highres_imu__temperature = imu[interface.IMU_TEMPERATURE_C]
 
@@ -207,10 +213,16 @@ class MotionMessages:
         self._readings = readings
         self._place = np.zeros(_PLACE_SIZE)
         self._time_us = -1
+        self._marked_us = -1
+        self._groups = (
+            (readings.magnetometer, _MAG_FIELDS),
+            (readings.barometer, _BARO_FIELDS),
+            (readings.airspeed, _DIFFERENTIAL_FIELD),
+        )
+        self._sent_us = [-1] * len(self._groups)  # times of the readings that HIGHRES_IMU has had
         self._record = np.zeros(1, record_type(*map(definition, MESSAGES), prefixed=True))
         self._bytes = self._record.view(np.uint8).data
         row = self._record[0]
-        row["highres_imu__fields_updated"] = _HIGHRES_FIELDS_UPDATED
         row["odometry__frame_id"] = row["odometry__child_frame_id"] = dialect.MAV_FRAME_LOCAL_NED
         row["odometry__estimator_type"] = dialect.MAV_ESTIMATOR_TYPE_AUTOPILOT
         row["odometry__pose_covariance"] = row["odometry__velocity_covariance"] = math.nan
@@ -227,6 +239,7 @@ class MotionMessages:
             readings.imu.values,
             readings.magnetometer.values,
             readings.barometer.values,
+            readings.airspeed.values,
             navigation.covariance,
             self._place,
             context.home_ned_m,
@@ -268,6 +281,8 @@ class MotionMessages:
     def _make(self, due: int, encoder: FrameEncoder) -> int:
         """Make the frames; returns their length."""
         self._fresh()
+        if due & _NEED_SENSORS:
+            self._mark_updated()
         sequence = encoder.sequence
         encoder.sequence = (sequence + due.bit_count()) & 0xFF
         sender = encoder.system_id << 8 | encoder.component_id
@@ -305,7 +320,21 @@ class MotionMessages:
     def _highres_imu(self) -> bytes | None:
         if self._readings.imu.time_us < 0 or self._readings.barometer.time_us < 0:
             return None
-        return self._fresh()[self._slices["HIGHRES_IMU"]].tobytes()
+        data = self._fresh()
+        self._mark_updated()
+        return data[self._slices["HIGHRES_IMU"]].tobytes()
+
+    def _mark_updated(self) -> None:
+        """Mark what is new in HIGHRES_IMU since the one before; in one step all have the same marks."""
+        if self._marked_us == self._time_us:
+            return
+        self._marked_us = self._time_us
+        fields = _INERTIAL_FIELDS
+        for index, (reading, bits) in enumerate(self._groups):
+            if reading.time_us > self._sent_us[index]:
+                self._sent_us[index] = reading.time_us
+                fields |= bits
+        self._record[0]["highres_imu__fields_updated"] = fields
 
     def _fresh(self) -> memoryview:
         """The records of this step."""

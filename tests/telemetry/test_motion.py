@@ -9,6 +9,7 @@ from autopilot_bridge.mavlink import FrameEncoder, FrameParser, decode, definiti
 from autopilot_bridge.navigation import layout
 from autopilot_bridge.sitl import Sitl
 from autopilot_bridge.telemetry.motion import MESSAGES
+from flightsim import interface
 from flightsim.world_spec import WorldSpec
 
 
@@ -55,6 +56,33 @@ def test_contents_are_the_navigation_state(flying: Sitl) -> None:
     assert (place.lat, place.lon) == (round(lat_deg * 1e7), round(lon_deg * 1e7))
     assert place.alt == pytest.approx(alt_m * 1e3, abs=1.0)
     assert messages["HIGHRES_IMU"].zacc == pytest.approx(-9.8, abs=0.3)
+
+
+def test_highres_imu_marks_what_is_new_since_the_one_before(flying: Sitl) -> None:
+    """PX4 1.16.1: 63 with the gyro's samples, the other groups where they have a new sample."""
+    autopilot = flying.vehicles[0].autopilot
+    motion = autopilot._streams._motion
+    readings = motion._readings
+    bit = motion.bits[definition("HIGHRES_IMU").message_id]
+    before = readings.magnetometer.time_us, readings.airspeed.time_us, readings.airspeed.values.copy()
+
+    def marks(step: int) -> Any:
+        autopilot._view.advance(flying.time_us + step)
+        (frame,) = FrameParser().feed(motion.packet(bit, FrameEncoder(7, 1))[0])
+        return decode(frame)
+
+    try:
+        assert marks(1).diff_pressure == 0.0  # a multicopter has no pitot tube
+        assert (marks(2).fields_updated, marks(3).fields_updated) == (0x3F, 0x3F)
+        readings.magnetometer.time_us = readings.airspeed.time_us = flying.time_us + 4
+        readings.airspeed.values[interface.AIRSPEED_DIFFERENTIAL_PRESSURE_PA] = 283.0
+        found = marks(4)
+        assert (found.fields_updated, found.diff_pressure) == (0x3F | 0x1C0 | 0x400, 283.0)
+        assert marks(5).fields_updated == 0x3F
+    finally:
+        readings.magnetometer.time_us, readings.airspeed.time_us = before[:2]
+        readings.airspeed.values[:] = before[2]
+        autopilot._view.advance(flying.time_us)
 
 
 def test_global_position_has_centimetres_per_second_and_centidegrees(flying: Sitl) -> None:
