@@ -161,7 +161,7 @@ def _content(values: NDArray[np.generic]) -> str:
 def _flight(positions: Table, armed_us: int, disarmed_us: int) -> Facts:
     """Times of the take-off, the step and the way home, and by how much they overshoot."""
     inside = positions.time_us >= armed_us
-    time_s = 1e-6 * (positions.time_us[inside] - armed_us)
+    time_s: Array = 1e-6 * (positions.time_us[inside] - armed_us).astype(np.float64)
     up = -positions.si("z")[inside]
     up -= up[0]
     step_m = positions.si("x")[inside]
