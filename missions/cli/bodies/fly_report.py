@@ -4,7 +4,7 @@ import math
 import os
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from typing import Any, Final
 
 import click
@@ -12,14 +12,14 @@ import click
 from autopilot_bridge.clock.pacing import wall_time_s
 from estimators.received import counted_words
 from estimators.reports import warnings_of
-from missions.cli.bodies.status_line import StatusLine, announce_compiling
+from missions.cli.bodies.status_line import COMPILING, PipeLines, StatusLine, announce_compiling
 from missions.cli.exit_codes import FAILED
 from missions.cli.options import report
 from missions.flown.run_folder import POOR, wind_words
 from missions.how_left import lines
 from missions.runs.session import Flight, RunResult
 from missions.vehicle.notes import FLIGHT
-from missions.vehicle.telemetry import Position
+from missions.vehicle.telemetry import Battery, Position
 from missions.vehicle.vehicle import Vehicle
 
 _PACE_S: Final = 5.0
@@ -41,11 +41,13 @@ def leave_closed_terminal() -> None:
 
 class ProgressLine:
     """The progress of a flight on stderr: on a terminal a status line, which is not shown while it is held;
-    in a pipe a line of text for each phase (of a script: mode) that a vehicle is the first to begin.
+    in a pipe a line of text for each phase (of a script: mode) that a vehicle is the first to begin, and one
+    every few seconds.
     """
 
     def __init__(self) -> None:
         self._line = StatusLine()
+        self._pipe = PipeLines()
         self._held = False
         self._last_wall_s = -math.inf
         self._pace = Pace()
@@ -74,13 +76,15 @@ class ProgressLine:
         if self._line.terminal:
             self._show(flight, known)
             return
-
+        factor = self._pace.factor(wall_time_s(), flight.elapsed_s)
+        self._pipe.show("" if self._held else f"{flight.elapsed_s:.1f} s: {_status(known, factor)}")
         for vehicle in known:
             phase = vehicle.notes.current
             if phase == FLIGHT:
                 phase = f"{phase}, {vehicle.mode}"  # the phases of a script are its modes
             if phase and phase not in self._phases:
                 self._phases.add(phase)
+                self._pipe.said()
                 click.echo(f"{flight.elapsed_s:.1f} s: {phase}, {_state(known)[1]}", err=True)
 
     def _show(self, flight: Flight, known: Sequence[Vehicle]) -> None:
@@ -91,9 +95,10 @@ class ProgressLine:
         time_s = flight.elapsed_s
         factor = self._pace.factor(now_s, time_s)
         mode, height = _state(known)
-        speed = "" if factor is None else f"x{factor:.1f}"
-        line = f"{time_s:8.1f} s  {speed:<7} {mode:<10} {height:>8}  {_phase(known)}"
-        self._line.show((line + _awaited(flight.vehicles)).rstrip())
+        pace = "" if factor is None else f"x{factor:.1f}"
+        line = f"{time_s:8.1f} s  {pace:<7} {mode:<10} {height:>8}  {_phase(known)}"
+        more = _awaited(flight.vehicles) or "  ".join(("", *_speed_and_battery(known), *_newest_text(known)))
+        self._line.show((line + more).rstrip())
 
     @contextmanager
     def held(self) -> Iterator[None]:
@@ -115,11 +120,14 @@ class ProgressLine:
         """Context of the flight: what a mission prints stands on lines of its own, above the progress line,
         and one line says that code is compiled, if it is.
         """
-        with announce_compiling(self._note), self._line.shared():
+        lines = nullcontext() if self._line.terminal else self._pipe.running()
+        with announce_compiling(self._note), self._line.shared(), lines:
             yield
 
     def _note(self, text: str) -> None:
         self._line.erase()
+        self._pipe.said()
+        self._pipe.doing(COMPILING)
         click.echo(text, err=True)
 
     def end(self) -> None:
@@ -148,6 +156,33 @@ def _phase(known: Sequence[Vehicle]) -> str:
     phases = "/".join(dict.fromkeys(vehicle.notes.current for vehicle in known if vehicle.notes.current))
     progress = sum(vehicle.notes.progress for vehicle in known) / max(1, len(known))
     return f"{phases} {100.0 * progress:.0f} %" if progress > 0.0 else phases
+
+
+def _status(known: Sequence[Vehicle], factor: float | None) -> str:
+    """A line about the vehicles for a pipe: mode, height, speed, battery, progress, and the pace."""
+    mode, height = _state(known)
+    pace = () if factor is None else (f"x{factor:.1f}",)
+    return ", ".join(filter(None, (mode, height.strip(), *_speed_and_battery(known), _phase(known), *pace)))
+
+
+def _speed_and_battery(known: Sequence[Vehicle]) -> list[str]:
+    """Ground speeds and the rest of the batteries, as far as the vehicles report them."""
+    positions = [vehicle.latest(Position) for vehicle in known]
+    batteries = [vehicle.latest(Battery) for vehicle in known]
+    speeds = [f"{position.ground_speed_m_s:.1f}" for position in positions if position]
+    left = [
+        f"{100.0 * battery.remaining:.0f}" for battery in batteries if battery and battery.remaining >= 0.0
+    ]
+    return [
+        *([f"{'/'.join(speeds)} m/s"] if speeds else ()),
+        *([f"{'/'.join(left)} % battery"] if left else ()),
+    ]
+
+
+def _newest_text(known: Sequence[Vehicle]) -> list[str]:
+    """The newest text of the vehicles."""
+    texts = [vehicle.link.texts.newest[-1] for vehicle in known if vehicle.link.texts.newest]
+    return [repr(max(texts, key=lambda text: text.received_us).text)] if texts else []
 
 
 def _awaited(vehicles: Sequence[Vehicle]) -> str:

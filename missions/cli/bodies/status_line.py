@@ -1,23 +1,75 @@
 """The status line of a terminal, which other output does not disturb."""
 
 import sys
+import threading
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from shutil import get_terminal_size
-from typing import Any, TextIO, cast
+from typing import Any, Final, TextIO, cast
 
 import click
 
+from autopilot_bridge.clock.pacing import wall_time_s
 from flightsim.foundation.kernels import when_compiling
 
-__all__ = ["StatusLine", "announce_compiling"]
+__all__ = ["PipeLines", "StatusLine", "announce_compiling"]
+
+PIPE_PERIOD_S: Final = 10.0
+COMPILING: Final = "compiling the flight code"
 
 
 @contextmanager
 def announce_compiling(say: Callable[[str], None]) -> Iterator[None]:
     """Context in which it is said once that flight code is compiled, if the cache does not have all of it."""
-    with when_compiling(lambda: say("compiling the flight code: half a minute or so, the first time")):
+    with when_compiling(lambda: say(f"{COMPILING}: half a minute or so, the first time")):
         yield
+
+
+class PipeLines:
+    """Progress in a pipe or a file: the newest text as a line on stderr every few seconds, also while the
+    program computes and reports nothing.
+
+    Args:
+        period_s: wall time between two lines.
+    """
+
+    def __init__(self, period_s: float = PIPE_PERIOD_S) -> None:
+        self._period_s = period_s
+        self._text: Callable[[], str] = str
+        self._other_line = False
+        self._done = threading.Event()
+
+    def show(self, text: Callable[[], str] | str) -> None:
+        """The newest text, or what makes it: a text stays true while nothing else is reported."""
+        self._text = text if callable(text) else lambda: text
+
+    def doing(self, what: str) -> None:
+        """What is done now and reports no progress: its line says for how long."""
+        begun_s = wall_time_s()
+        self._text = lambda: f"{what}: {wall_time_s() - begun_s:.0f} s so far"
+
+    def said(self) -> None:
+        """Another line was printed: the next one can wait."""
+        self._other_line = True
+
+    @contextmanager
+    def running(self) -> Iterator[None]:
+        """Context in which lines are printed."""
+        printer = threading.Thread(target=self._print, name="progress", daemon=True)
+        printer.start()
+        try:
+            yield
+        finally:
+            self._done.set()
+            printer.join()
+
+    def _print(self) -> None:
+        while not self._done.wait(self._period_s):
+            text = self._text()
+            if text and not self._other_line:
+                with suppress(OSError, ValueError):  # whoever read it is gone
+                    click.echo(text, err=True)
+            self._other_line = False
 
 
 class StatusLine:

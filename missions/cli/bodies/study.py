@@ -7,7 +7,8 @@ import re
 import shlex
 import sys
 import traceback
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 from types import FrameType
@@ -15,7 +16,7 @@ from typing import Any, Final
 
 import click
 
-from missions.cli.bodies.status_line import StatusLine
+from missions.cli.bodies.status_line import PipeLines, StatusLine
 from missions.cli.bodies.world import firmware_of
 from missions.cli.declared_options import Given, made_of_values
 from missions.cli.exit_codes import FAILED
@@ -170,26 +171,22 @@ def _run_and_tell(
             raise EndedBySignal(number)
 
     line = _ProgressLine()
-    line.start(study.name)
-    try:
-        with Ending():
-            result = run_study(
-                study,
-                runs=how.runs,
-                seed=how.seed,
-                engine=engine_of(how, given["ray"]),
-                out=given["out"],
-                resume=given["resume"],
-                keep_logs=how.keep_logs,
-                time_limit_s=how.time_limit_s,
-                picture=not given["no_picture"],
-                command=shlex.join(["flightstack", *sys.argv[1:]]),
-                repeat=repeat,
-                arguments=arguments,
-                on_progress=line,
-            )
-    finally:
-        line.end()
+    with line.running(study.name), Ending():
+        result = run_study(
+            study,
+            runs=how.runs,
+            seed=how.seed,
+            engine=engine_of(how, given["ray"]),
+            out=given["out"],
+            resume=given["resume"],
+            keep_logs=how.keep_logs,
+            time_limit_s=how.time_limit_s,
+            picture=not given["no_picture"],
+            command=shlex.join(["flightstack", *sys.argv[1:]]),
+            repeat=repeat,
+            arguments=arguments,
+            on_progress=line,
+        )
     return _tell(result)
 
 
@@ -245,22 +242,31 @@ def words_of(options: tuple[click.Parameter, ...], given: Given) -> list[str]:
 
 
 class _ProgressLine:
-    """The progress on a terminal; nothing in a pipe."""
+    """The progress: on a terminal a status line, in a pipe a line every few seconds."""
 
     def __init__(self) -> None:
         self._line = StatusLine()
+        self._pipe = PipeLines()
 
-    def start(self, name: str) -> None:
+    @contextmanager
+    def running(self, name: str) -> Iterator[None]:
+        """Context of the study."""
+        self._pipe.doing(f"{name}: the first trials")
         if self._line.terminal:
             self._line.show(f"{name}: starting")
+        try:
+            with nullcontext() if self._line.terminal else self._pipe.running():
+                yield
+        finally:
+            self._line.end()
 
     def __call__(self, progress: Progress) -> None:
         left = "" if progress.left_s is None else f", {_clock(progress.left_s)} left"
         rate = "" if progress.rate_hz == 0.0 else f", {progress.rate_hz:.3g}/s"
-        self._line.show(f"{progress.done}/{progress.trials} done, {progress.failed} failed{rate}{left}")
-
-    def end(self) -> None:
-        self._line.end()
+        text = f"{progress.done}/{progress.trials} done, {progress.failed} failed{rate}{left}"
+        self._line.show(text)
+        if progress.done:
+            self._pipe.show(text)
 
 
 def _clock(seconds: float) -> str:
