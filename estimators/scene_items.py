@@ -4,9 +4,10 @@ Positions are metres, north east down of the scene's origin, unless an item is `
 role, from which a viewer takes its colour.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
-from typing import NamedTuple, Self
+from typing import Final, NamedTuple, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +34,21 @@ __all__ = [
 ]
 
 Array = NDArray[np.float64]
+
+_ON_CIRCLE: Final = 72
+
+
+class Layout(Protocol):
+    """Square cells over a rectangle: its south-western corner and the side of a cell."""
+
+    @property
+    def south_m(self) -> float: ...
+
+    @property
+    def west_m(self) -> float: ...
+
+    @property
+    def cell_m(self) -> float: ...
 
 
 class Role(StrEnum):
@@ -109,6 +125,31 @@ class Line:
     role: Role = Role.COMMANDED
     label: str = ""
 
+    @classmethod
+    def rectangle(
+        cls,
+        *,
+        south_m: float,
+        west_m: float,
+        north_m: float,
+        east_m: float,
+        label: str = "",
+        role: Role = Role.AREA,
+    ) -> Self:
+        """A closed rectangle on the ground."""
+        corners = ((south_m, west_m), (north_m, west_m), (north_m, east_m), (south_m, east_m))
+        points = np.array([(*corner, 0.0) for corner in corners])
+        return cls(points_ned_m=points, closed=True, role=role, label=label)
+
+    @classmethod
+    def circle(
+        cls, middle_ned_m: Vector, radius_m: float, *, label: str = "", role: Role = Role.COMMANDED
+    ) -> Self:
+        """A level circle."""
+        angle = np.linspace(0.0, 2.0 * np.pi, _ON_CIRCLE, endpoint=False)
+        points = np.column_stack([radius_m * np.cos(angle), radius_m * np.sin(angle), np.zeros(_ON_CIRCLE)])
+        return cls(points_ned_m=points + np.asarray(middle_ned_m), closed=True, role=role, label=label)
+
     def moved(self, by_ned_m: Vector) -> Self:
         """The item at another place."""
         return replace(self, points_ned_m=self.points_ned_m + np.asarray(by_ned_m))
@@ -137,6 +178,18 @@ class PointSet:
     unit: str = ""
     labels: tuple[str, ...] = ()
     role: Role = Role.BELIEF
+
+    @classmethod
+    def on_ground(
+        cls,
+        places_ne_m: Sequence[tuple[float, float]],
+        *,
+        labels: Sequence[str] = (),
+        role: Role = Role.FOUND,
+    ) -> Self:
+        """Places, north and east, at the height of the origin."""
+        points = np.array([(north_m, east_m, 0.0) for north_m, east_m in places_ne_m]).reshape(-1, 3)
+        return cls(points_ned_m=points, labels=tuple(labels), role=role)
 
     def moved(self, by_ned_m: Vector) -> Self:
         """The item at another place."""
@@ -201,6 +254,27 @@ class Field:
     low: float | None = None
     high: float | None = None
     role: Role = Role.BELIEF
+
+    @classmethod
+    def on(
+        cls,
+        layout: Layout,
+        values: NDArray[np.floating],
+        *,
+        unit: str,
+        low: float | None = None,
+        high: float | None = None,
+    ) -> Self:
+        """Values, as they are now, in the cells of a grid (`estimators.tracking.grid.GridLayout`)."""
+        return cls(
+            values=values.astype(np.float32),
+            south_m=layout.south_m,
+            west_m=layout.west_m,
+            cell_m=layout.cell_m,
+            unit=unit,
+            low=low,
+            high=high,
+        )
 
     def moved(self, by_ned_m: Vector) -> Self:
         """The item at another place."""

@@ -21,6 +21,7 @@ from estimators.multi_target.estimate import MultiTargetEstimate, SearchEstimate
 from estimators.multi_target.parameters import MultiTargetParameters
 from estimators.multi_target.scans import Scan, ScanAssembler
 from estimators.multi_target.search_belief import SearchBelief
+from estimators.scene_items import Item
 from estimators.tracking.range_bearing import Viewpoint
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 
@@ -190,6 +191,10 @@ class MultiTargetEstimator(Estimator[MultiTargetParameters]):
     def origin(self) -> GeodeticPosition | None:
         """The home of the centre vehicle."""
         return None if self._frame is None else self._frame.origin
+
+    def shown(self) -> Mapping[str, Item]:
+        """The intensity, the unexplored, and the reported targets."""
+        return self.belief.shown()
 
     def publish(self) -> Sequence[MAVLinkMessage]:
         """FOLLOW_TARGET for each target found since the last call, with its standard deviation per axis in

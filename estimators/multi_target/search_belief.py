@@ -14,10 +14,12 @@ from numpy.typing import NDArray
 from estimators.multi_target.estimate import TargetRow
 from estimators.multi_target.models import layout_of, motion_of, particles_of, sensor_of
 from estimators.multi_target.parameters import Belief, MultiTargetParameters
+from estimators.scene_items import Field, Item, PointSet, Role, Value
 from estimators.tracking.exploration import ExplorationMap
 from estimators.tracking.found_targets import FoundTargets
 from estimators.tracking.gaussian_components import Components
 from estimators.tracking.gaussian_phd import GaussianPhd
+from estimators.tracking.information import condensed
 from estimators.tracking.intensity import Cluster, TargetIntensity
 from estimators.tracking.multi_bernoulli import MultiBernoulli
 from estimators.tracking.range_bearing import Viewpoint
@@ -28,6 +30,7 @@ __all__ = ["FoundTarget", "SearchBelief"]
 
 Array = NDArray[np.float64]
 
+_SHOWN_CELL_M: Final = 1.0  # particles are shown together in cells
 _LEAST_AWAY: Final = 0.05  # share of a found target that has left its place, which is worth a look
 _OWN_GATE: Final = 11.83  # squared distance, 99.7 % in the plane: a far measurement of a found target
 
@@ -208,6 +211,38 @@ class SearchBelief:
             for c in self.candidates
         ]
         return (*found, *others)
+
+    def shown(self) -> dict[str, Item]:
+        """The belief for viewers: where targets are, where none was looked for, and what is reported."""
+        north, east, mass = condensed(*self.intensity.points(), cell_m=_SHOWN_CELL_M)
+        rows = self.targets
+        found = [row for row in rows if row.found]
+        others = [row for row in rows if not row.found]
+        return {
+            "unexplored": Field.on(
+                self.exploration.layout,
+                self.exploration.undetected,
+                unit="not yet detected",
+                low=0.0,
+                high=1.0,
+            ),
+            "intensity": PointSet(
+                points_ned_m=np.column_stack([north, east, np.zeros_like(north)]),
+                weights=mass,
+                unit="targets",
+            ),
+            "found": PointSet.on_ground(
+                [(row.north_m, row.east_m) for row in found],
+                labels=[f"found {k + 1}" for k in range(len(found))],
+            ),
+            "candidates": PointSet.on_ground(
+                [(row.north_m, row.east_m) for row in others],
+                labels=[f"{row.mass:.2f}" for row in others],
+                role=Role.BELIEF,
+            ),
+            "expected_undetected": Value(value=self.expected_undetected, role=Role.BELIEF),
+            "expected_targets": Value(value=self.expected_targets, role=Role.BELIEF),
+        }
 
     @property
     def expected_targets(self) -> float:

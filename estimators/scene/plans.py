@@ -18,7 +18,6 @@ from flightsim.foundation.geodesy import LocalFrame
 __all__ = ["ReceivedPlans"]
 
 _MOST_ITEMS: Final = 10_000
-_ON_CIRCLE: Final = 72
 _NAV_COMMANDS: Final = range(dialect.MAV_CMD_NAV_WAYPOINT, dialect.MAV_CMD_NAV_LAST)
 
 
@@ -85,15 +84,11 @@ def _plan(base: str, time_us: int, items: Sequence[MissionItem], frame: LocalFra
 
 
 def _outline(shape: FenceShape) -> Line:
-    if isinstance(shape, FenceCircle):
-        angle = np.linspace(0.0, math.tau, _ON_CIRCLE, endpoint=False)
-        north_m, east_m = shape.centre
-        points = np.column_stack(
-            [north_m + shape.radius_m * np.cos(angle), east_m + shape.radius_m * np.sin(angle), 0.0 * angle]
-        )
-    else:
-        points = _on_ground(shape.vertices)
     label = "fence" if shape.inclusion else "fence: keep out"
+    if isinstance(shape, FenceCircle):
+        north_m, east_m = shape.centre
+        return Line.circle((north_m, east_m, 0.0), shape.radius_m, role=Role.FENCE, label=label)
+    points = _on_ground(shape.vertices)
     return Line(points_ned_m=points, closed=True, role=Role.FENCE, label=label)
 
 

@@ -24,8 +24,10 @@ from autopilot_bridge.mavlink.wire_units import e7, home_of, metres, place_of
 from estimators import wire
 from estimators.interface import Estimator, Need, Outcome
 from estimators.messages import Message, on
+from estimators.scene_items import Field, Item
 from estimators.tracking.area_belief import AreaBelief
 from estimators.tracking.camera_sight import CameraSight
+from estimators.tracking.grid import GridLayout
 from estimators.vision_search.estimate import AreaEstimate
 from estimators.vision_search.frames import Camera, likelihood_of, sight_of
 from estimators.vision_search.models import new_belief, pose_errors_of
@@ -40,6 +42,7 @@ _POSITION_KNOWN: Final = 1  # FOLLOW_TARGET.est_capabilities, bit 0
 _CLOCKS_APART_S: Final = 0.25  # from exposure to the newest attitude, beyond what a detector takes
 _AHEAD_S: Final = 5.0  # a likelihood whose exposure is farther in the future, or ...
 _OLD_S: Final = 600.0  # ... older, is not possible
+_SHOWN_CELLS: Final = 100  # of the longer side, for viewers
 _CLOCK_FRAMES: Final = 20  # of which the median is taken
 
 
@@ -311,6 +314,17 @@ class VisionSearchEstimator(Estimator[VisionSearchParameters]):
     def origin(self) -> GeodeticPosition | None:
         """The home of the centre vehicle."""
         return None if self._frame is None else self._frame.origin
+
+    def shown(self) -> Mapping[str, Item]:
+        """The probability of the target's place, in at most some thousand cells."""
+        p = self.parameters
+        layout = GridLayout.over(
+            width_m=p.east_m - p.west_m,
+            height_m=p.north_m - p.south_m,
+            cell_m=max(p.east_m - p.west_m, p.north_m - p.south_m) / _SHOWN_CELLS,
+            centre_ne_m=(0.5 * (p.south_m + p.north_m), 0.5 * (p.west_m + p.east_m)),
+        )
+        return {"probability": Field.on(layout, self.belief.shares(layout), unit="probability", low=0.0)}
 
     def take_likelihoods(self) -> list[SearchLikelihood]:
         """The likelihoods of the own vehicle's frames since the last call, for the other vehicles."""

@@ -5,6 +5,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
+from estimators.scene_items import Item
 from missions.base.flight import MissionFlight
 from missions.base.mission import Mission, WorldDefaults
 from missions.base.report import Debriefing, Report
@@ -61,6 +62,10 @@ class MultiTargetFlight(MissionFlight[MultiTargetOptions]):
 
     async def fly(self) -> None:
         await self.team.fly()
+
+    def shown(self) -> Mapping[str, Item]:
+        area, search = self.options[0].area, self.team.search
+        return {"area": area.shown, **search.belief.shown(), **search.shown_goals()}
 
     def report(self, debriefing: Debriefing) -> Report:
         team = self.team

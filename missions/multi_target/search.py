@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from estimators.multi_target.estimate import TargetRow
 from estimators.multi_target.search_belief import SearchBelief
+from estimators.scene_items import Item, PointSet, Role
 from estimators.tracking.information import condensed
 from estimators.tracking.range_bearing import Viewpoint
 from flightsim.foundation.geodetic_position import NorthEast
@@ -188,6 +189,13 @@ class TargetSearch:
         self._goals[index] = there
         self.steps.append(Step(time_us=time_us, vehicle=index, here=here, there=there))
         return there
+
+    def shown_goals(self) -> dict[str, Item]:
+        """Where each vehicle scans next, for viewers."""
+        goals = [(k, goal) for k, goal in enumerate(self._goals) if goal is not None]
+        labels = [f"next scan of {k + 1}" for k, _ in goals]
+        places = [goal for _, goal in goals]
+        return {"goals": PointSet.on_ground(places, labels=labels, role=Role.COMMANDED)}
 
     def leave(self, index: int) -> None:
         """A vehicle has ended its search."""

@@ -6,6 +6,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+from estimators.scene_items import Item
 from flightsim.foundation.geodesy import GeodeticPosition
 from missions.base.flight import MissionFlight
 from missions.base.mission import Mission, WorldDefaults
@@ -81,6 +82,9 @@ class OccupancyFlight(MissionFlight[OccupancyOptions]):
 
     async def fly(self) -> None:
         await self.team.fly()
+
+    def shown(self) -> Mapping[str, Item]:
+        return self.team.search.shown()
 
     def report(self, debriefing: Debriefing) -> Report:
         team = self.team

@@ -14,6 +14,7 @@ from estimators.magnetic_identification.samples import Sample
 from estimators.occupancy.detection import Anomaly, DetectionModel
 from estimators.occupancy.occupancy_map import OccupancyMap
 from estimators.occupancy.placed_readings import PlacedReading
+from estimators.scene_items import Field, Item, Line, PointSet, Role, Value
 from estimators.tracking.grid import GridCell, GridLayout
 from missions.occupancy.candidate import Candidate
 from missions.occupancy.decision import Decision, decide
@@ -240,6 +241,37 @@ class Search:
         if self.investigation is not None:
             self.investigation.leave(searcher)
 
+    def shown(self) -> dict[str, Item]:
+        """The map, the candidates, the goals and what was found, for viewers."""
+        layout, belief = self.map.layout, self.map.belief.mass
+        candidates = [candidate for candidate in self.candidates if candidate is not self.found]
+        shown: dict[str, Item] = {
+            "area": Line.rectangle(
+                south_m=layout.south_m,
+                west_m=layout.west_m,
+                north_m=layout.north_m,
+                east_m=layout.east_m,
+                label="searched area",
+            ),
+            "occupancy": Field.on(layout, self.map.scores, unit="score", low=0.0),
+            "undetected": Field.on(layout, belief, unit="probability", low=0.0),
+            "candidates": PointSet.on_ground(
+                [candidate.place_ne_m for candidate in candidates],
+                labels=[_candidate_label(candidate) for candidate in candidates],
+                role=Role.MEASURED,
+            ),
+            "goals": PointSet.on_ground(
+                [layout.centre_of(cell) for cell in self._targets if cell is not None],
+                labels=[f"next of {k + 1}" for k, cell in enumerate(self._targets) if cell is not None],
+                role=Role.COMMANDED,
+            ),
+            "probability_of_detection": Value(value=self.map.probability_of_detection, role=Role.BELIEF),
+        }
+        if self.found is not None:
+            label = f"target, {_finders(self.found)}"
+            shown["found"] = PointSet.on_ground([self.found.place_ne_m], labels=[label])
+        return shown
+
     def _keep_snapshot(self, time_us: int, *, event: bool) -> None:
         self._snapshots.add(
             Snapshot(
@@ -256,3 +288,15 @@ class Search:
         candidate = Candidate(anomalies=[], noise_nt=self._noise_nt)
         self.candidates.append(candidate)
         return candidate
+
+
+def _candidate_label(candidate: Candidate | Suspect) -> str:
+    if isinstance(candidate, Suspect):
+        return f"{candidate.verdict}, probability {candidate.probability:.2f}, {_finders(candidate)}"
+    return f"anomaly, {_finders(candidate)}"
+
+
+def _finders(candidate: Candidate | Suspect) -> str:
+    """Numbers of the searchers that measured it, in the order of time."""
+    numbers = dict.fromkeys(searcher + 1 for searcher, _ in candidate.anomalies)
+    return f"measured by searcher {', '.join(map(str, numbers))}"

@@ -7,6 +7,7 @@ from statistics import fmean, pstdev
 from typing import Final
 
 from estimators.orbit_target.tracker import TargetStatus
+from estimators.scene_items import Gaussian, Item, Line, Pose, Relative, Role, Text
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from missions.errors import MissionError
 from missions.orbit.checks import airspeed_of, check_camera
@@ -102,6 +103,26 @@ class OrbitFlight:
         self._begin("landing")
         await vehicle.wing.land_along()
         vehicle.notes.end(self._stamp_us)
+
+    def shown(self) -> dict[str, Item]:
+        """The target as the aircraft knows it, relative to itself, and the circle around it; for viewers."""
+        found: dict[str, Item] = {}
+        (north_m, east_m), _ = self._observer.target_ne(self._now_us)
+        given = Pose(pos_ned_m=(north_m, east_m, 0.0), role=Role.COMMANDED, label="target, as given")
+        if self._observer.with_gps:
+            found["given_target"] = given
+        system_id, target = self._vehicle.system_id, self._tracker.target
+        known = f"target {self._tracker.status.value}"
+        found["target_status"] = Text(text=known, state=self._tracker.status.value, role=Role.BELIEF)
+        gps = "GPS" if self._observer.with_gps else "no GPS"
+        found["navigation"] = Text(text=f"flown with {gps}", state=gps, warning=not self._observer.with_gps)
+        if target.known and math.isfinite(self._tracker.height_m):
+            offset = *self._tracker.state(self._stamp_us).offset_ne_m, self._tracker.height_m
+            place = Gaussian(mean_ned_m=offset, covariance_m2=target.offset_covariance_m2.copy(), label=known)
+            circle = Line.circle((*offset[:2], 0.0), self._options.radius_m, label="orbit")
+            found["target"] = Relative(item=place, system_id=system_id)
+            found["orbit"] = Relative(item=circle, system_id=system_id)
+        return found
 
     # the flight
 

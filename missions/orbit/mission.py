@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
+from estimators.scene_items import Item
 from missions.base.flight import MissionFlight
 from missions.base.mission import Mission, WorldDefaults
 from missions.base.report import Debriefing, Report, verdict_of_all
@@ -80,12 +81,24 @@ class OrbitMission(Mission[OrbitOptions]):
 class OrbitMissionFlight(MissionFlight[OrbitOptions]):
     """Orbits, one by each vehicle."""
 
+    def __init__(self, vehicles: Sequence[Vehicle], options: Sequence[OrbitOptions]) -> None:
+        super().__init__(vehicles, options)
+        self._flights: dict[int, OrbitFlight] = {}
+
+    def shown(self) -> Mapping[str, Item]:
+        found: dict[str, Item] = {}
+        for system_id, flight in self._flights.items():
+            before = f"vehicle_{system_id}/" if len(self.vehicles) > 1 else ""
+            found |= {before + name: item for name, item in flight.shown().items()}
+        return found
+
     async def fly_one(self, index: int) -> None:
         vehicle, options = self.vehicles[index], self.options[index]
         limits = await vehicle.limits(options.own_altitude_m)
         check_vehicle(options, limits)
         assert isinstance(limits, FixedWingLimits)
-        await OrbitFlight(vehicle, options, limits).fly()
+        flight = self._flights[vehicle.system_id] = OrbitFlight(vehicle, options, limits)
+        await flight.fly()
 
     def report(self, debriefing: Debriefing) -> Report:
         own = {

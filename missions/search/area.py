@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import Any, Final, Protocol
 
+from estimators.scene_items import Line
 from flightsim.foundation.geodetic_position import NorthEast
 from flightsim.foundation.options import Shown
 from missions.errors import PlanError
@@ -56,6 +57,17 @@ class Area:
     def of(cls, edges: Edges) -> "Area":
         """The area of parameters that have its edges."""
         return cls(south_m=edges.south_m, west_m=edges.west_m, north_m=edges.north_m, east_m=edges.east_m)
+
+    @property
+    def shown(self) -> Line:
+        """The area for viewers."""
+        return Line.rectangle(
+            south_m=self.south_m,
+            west_m=self.west_m,
+            north_m=self.north_m,
+            east_m=self.east_m,
+            label="searched area",
+        )
 
     def check_sides(self, largest_m: float) -> None:
         """Refuse sides that are longer."""

@@ -5,6 +5,9 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from estimators.scene_items import Gaussian, Item, Role, Value
 from missions.base.flight import MissionFlight
 from missions.base.mission import Mission, WorldDefaults
 from missions.base.report import Debriefing, Report
@@ -60,6 +63,25 @@ class VisionSearchFlight(MissionFlight[VisionSearchOptions]):
 
     async def fly(self) -> None:
         await self.team.fly()
+
+    def shown(self) -> Mapping[str, Item]:
+        found: dict[str, Item] = {"area": self.options[0].area.shown}
+        for vehicle, estimator in zip(self.vehicles, self.team.watch.estimators, strict=True):
+            of = f"vehicle_{vehicle.system_id}"
+            found |= {f"{of}/{name}": item for name, item in estimator.shown().items()}
+            for estimate in estimator.estimates:
+                covariance = np.array(
+                    [
+                        [estimate.north_variance_m2, estimate.north_east_covariance_m2],
+                        [estimate.north_east_covariance_m2, estimate.east_variance_m2],
+                    ]
+                )
+                place = estimate.north_m, estimate.east_m, 0.0
+                label = f"target by vehicle {vehicle.system_id}"
+                found[f"{of}/target"] = Gaussian(mean_ned_m=place, covariance_m2=covariance, label=label)
+                detected = Value(value=estimate.probability_of_detection, role=Role.BELIEF)
+                found[f"{of}/probability_of_detection"] = detected
+        return found
 
     def report(self, debriefing: Debriefing) -> Report:
         team = self.team
