@@ -5,7 +5,7 @@ log.
 import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -33,15 +33,17 @@ from estimators.scene.timeline import Timeline
 from estimators.scene_items import Entry, Origin, Placed, PointSet, Pose, Role, Text, Value
 from estimators.status_texts import StatusTextAssembler
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
-from flightsim.foundation.vectors import Quaternion, Vector, conjugate, euler_of, from_euler, product
+from flightsim.foundation.vectors import Quaternion, Vector, between, conjugate, euler_of, from_euler, product
 
 __all__ = ["ORIGIN", "MessageScene"]
 
 ORIGIN: Final = "origin"
 """Path of the scene's origin."""
 
-_PERIOD_US: Final = 100_000
-_TOGETHER_US: Final = 100_000  # the estimate is compared with a truth that is as near in time
+PERIOD_US: Final = 100_000
+"""Of the samples that are shown of messages that come often."""
+_MOST_STEP_US: Final = 500_000  # of the truth that errors are taken from
+_AHEAD_US: Final = 50_000
 _WITHOUT_HOME_US: Final = 10_000_000
 _FIX_3D: Final = 3
 _UNKNOWN_SATELLITES: Final = 255
@@ -52,20 +54,41 @@ _POSITION_IGNORED: Final = (
 )
 
 
+class _True(NamedTuple):
+    """A true state."""
+
+    time_us: int
+    pos_ned_m: Vector
+    q_ned_from_frd: Quaternion
+
+
 @dataclass(slots=True)
 class _Vehicle:
     """The newest of one vehicle."""
 
     first_place_us: int | None = None
     q_ned_from_frd: Quaternion | None = None
-    attitude_us: int = -1
     place_ned_m: Vector | None = None
-    truth: tuple[int, Vector, Quaternion] | None = None
+    truth: _True | None = None
+    truth_before: _True | None = None
     accuracy_m: float = math.nan
     mode: str = ""
     armed: bool | None = None
     has_fix: bool | None = None
     texts: StatusTextAssembler = field(default_factory=StatusTextAssembler)
+
+    def truth_at(self, time_us: int) -> _True | None:
+        """The true state at a time near the newest two: on the line through them; None: not known then."""
+        before, newest = self.truth_before, self.truth
+        if before is None or newest is None:
+            return None
+        step_us = newest.time_us - before.time_us
+        if not 0 < step_us <= _MOST_STEP_US or abs(time_us - newest.time_us) > step_us + _AHEAD_US:
+            return None
+        share = (time_us - before.time_us) / step_us
+        place = tuple(a + share * (b - a) for a, b in zip(before.pos_ned_m, newest.pos_ned_m, strict=True))
+        q = between(before.q_ned_from_frd, newest.q_ned_from_frd, share)
+        return _True(time_us, (place[0], place[1], place[2]), q)
 
 
 class MessageScene:
@@ -76,24 +99,22 @@ class MessageScene:
 
     Attributes:
         NAMES: names of the messages that it uses.
+        SAMPLED: those of which it uses the first in each tenth of a second.
         timeline: converts vehicle times to the timeline of the run.
         origin: of the positions; None: not known yet.
     """
 
-    NAMES: Final = frozenset(
+    SAMPLED: Final = frozenset(
         {
-            *("HEARTBEAT", "STATUSTEXT", "SYSTEM_TIME", "HOME_POSITION"),
-            *("ATTITUDE", "ATTITUDE_QUATERNION", "GLOBAL_POSITION_INT", "GPS_RAW_INT", "VFR_HUD"),
-            *(
-                "ESTIMATOR_STATUS",
-                "SYS_STATUS",
-                "POSITION_TARGET_GLOBAL_INT",
-                "MISSION_COUNT",
-                "MISSION_ITEM_INT",
-            ),
+            *("ATTITUDE", "ATTITUDE_QUATERNION", "GLOBAL_POSITION_INT", "VFR_HUD", "ESTIMATOR_STATUS"),
+            *("SYS_STATUS", "POSITION_TARGET_GLOBAL_INT"),
             *("HIL_STATE_QUATERNION", "SIM_STATE", "SIMSTATE"),
         }
     )
+    NAMES: Final = SAMPLED | {
+        *("HEARTBEAT", "STATUSTEXT", "SYSTEM_TIME", "HOME_POSITION", "GPS_RAW_INT"),
+        *("MISSION_COUNT", "MISSION_ITEM_INT"),
+    }
 
     def __init__(self) -> None:
         self.timeline = Timeline()
@@ -101,7 +122,7 @@ class MessageScene:
         self._frame: LocalFrame | None = None
         self._vehicles: dict[int, _Vehicle] = {}
         self._plans = ReceivedPlans()
-        self._due_us: dict[tuple[str, int, int], int] = {}
+        self._slots: dict[tuple[str, int, int], int] = {}
         self._entries: list[Entry] = []
         self._handlers: dict[str, Callable[[int, Message], None]] = {
             **on(wire.HOME_POSITION, self._home),
@@ -131,8 +152,10 @@ class MessageScene:
             time_us: vehicle time of the message (`estimators.vehicle_time`).
             message: of any system and component; others than `NAMES` are ignored.
         """
-        time_us = self.timeline.take(time_us, message)
         name = message.name
+        if name in self.SAMPLED and not self._is_due(time_us, message):
+            return []
+        time_us = self.timeline.take(time_us, message)
         handler = self._handlers.get(name)
         if handler is None and message.src_component == AUTOPILOT_COMPONENT:
             handler = self._own_handlers.get(name) if message.src_system < GROUND_SYSTEM else None
@@ -147,7 +170,7 @@ class MessageScene:
         vehicle = self._vehicles.get(system_id)
         if vehicle is None:
             return None
-        return vehicle.truth[1] if vehicle.truth is not None else vehicle.place_ned_m
+        return vehicle.truth.pos_ned_m if vehicle.truth is not None else vehicle.place_ned_m
 
     def true_columns(
         self, system_id: int, time_us: int, origin: GeodeticPosition | None
@@ -159,11 +182,12 @@ class MessageScene:
             origin: of `north_m` and `east_m`; None: that of the scene.
         """
         vehicle = self._vehicles.get(system_id)
-        if vehicle is None or vehicle.truth is None or abs(vehicle.truth[0] - time_us) > _TOGETHER_US:
+        truth = None if vehicle is None else vehicle.truth_at(time_us)
+        if truth is None:
             return {}
-        _, (north_m, east_m, _), q = vehicle.truth
+        north_m, east_m, _ = truth.pos_ned_m
         shift = (0.0, 0.0, 0.0) if origin is None else self._ned(origin)
-        angles = dict(zip(("roll_rad", "pitch_rad", "yaw_rad"), euler_of(q), strict=True))
+        angles = dict(zip(("roll_rad", "pitch_rad", "yaw_rad"), euler_of(truth.q_ned_from_frd), strict=True))
         if shift is None:
             return angles
         return {**angles, "north_m": north_m - shift[0], "east_m": east_m - shift[1]}
@@ -181,13 +205,11 @@ class MessageScene:
         self._entries.append(Entry(f"vehicles/{message.src_system}/{name}", time_us, item))
 
     def _is_due(self, time_us: int, message: Message) -> bool:
-        """Whether a sample of this message of this sender is shown: ten a second are."""
-        key = message.name, message.src_system, message.src_component
-        due_us = self._due_us.get(key)
-        if due_us is not None and due_us - _PERIOD_US <= time_us < due_us:
+        """Whether a sample is shown: the first of this message and sender in each tenth of a second."""
+        key, slot = (message.name, message.src_system, message.src_component), time_us // PERIOD_US
+        if self._slots.get(key) == slot:
             return False
-        on_time = due_us is not None and due_us <= time_us < due_us + _PERIOD_US
-        self._due_us[key] = (due_us if due_us is not None and on_time else time_us) + _PERIOD_US
+        self._slots[key] = slot
         return True
 
     def _ned(self, found: GeodeticPosition | None) -> Vector | None:
@@ -212,26 +234,24 @@ class MessageScene:
         if math.isfinite(message.roll + message.pitch + message.yaw):
             vehicle = self._vehicle(message)
             vehicle.q_ned_from_frd = from_euler(message.roll, message.pitch, message.yaw)
-            vehicle.attitude_us = time_us
             self._attitude_error(time_us, message, vehicle)
 
     def _attitude_quaternion(self, time_us: int, message: wire.ATTITUDE_QUATERNION) -> None:
         q = unit_quaternion((message.q1, message.q2, message.q3, message.q4))
         if q is not None:
             vehicle = self._vehicle(message)
-            vehicle.q_ned_from_frd, vehicle.attitude_us = q, time_us
+            vehicle.q_ned_from_frd = q
 
     def _attitude_error(self, time_us: int, message: Message, vehicle: _Vehicle) -> None:
-        truth = vehicle.truth
-        if truth is None or abs(truth[0] - time_us) > _TOGETHER_US or not self._is_due(time_us, message):
+        truth = vehicle.truth_at(time_us)
+        if truth is None or vehicle.q_ned_from_frd is None:
             return
-        assert vehicle.q_ned_from_frd is not None
-        difference = product(conjugate(truth[2]), vehicle.q_ned_from_frd)
+        difference = product(conjugate(truth.q_ned_from_frd), vehicle.q_ned_from_frd)
         angle_deg = math.degrees(2.0 * math.acos(min(1.0, abs(difference[0]))))
         self._add(message, "error/attitude", time_us, Value(value=angle_deg, unit="deg", error=True))
 
     def _position(self, time_us: int, message: wire.GLOBAL_POSITION_INT) -> None:
-        if (message.lat == 0 and message.lon == 0) or not self._is_due(time_us, message):
+        if message.lat == 0 and message.lon == 0:
             return
         found = place_of(message)
         if found is None:
@@ -251,9 +271,9 @@ class MessageScene:
         self._add(message, "height", time_us, Value(value=-place_ned_m[2], unit="m"))
         speed_m_s = math.hypot(m_s(message.vx), m_s(message.vy))
         self._add(message, "speed/ground", time_us, Value(value=speed_m_s, unit="m/s"))
-        truth = vehicle.truth
-        if truth is not None and abs(truth[0] - time_us) <= _TOGETHER_US:
-            error_m = math.dist(place_ned_m[:2], truth[1][:2])
+        truth = vehicle.truth_at(time_us)
+        if truth is not None:
+            error_m = math.dist(place_ned_m[:2], truth.pos_ned_m[:2])
             found_error = Value(value=error_m, unit="m", sigma=vehicle.accuracy_m, error=True)
             self._add(message, "error/position", time_us, found_error)
 
@@ -283,8 +303,6 @@ class MessageScene:
             self._truth(time_us, message, home(message.lat, message.lng, alt_mm), q)
 
     def _truth(self, time_us: int, message: Message, found: GeodeticPosition | None, q: Quaternion) -> None:
-        if not self._is_due(time_us, message):
-            return
         place_ned_m = self._ned(found)
         if place_ned_m is None:
             return
@@ -293,7 +311,8 @@ class MessageScene:
             pose = Pose(pos_ned_m=place_ned_m, role=Role.TRUTH, label=f"target {number}, true")
             self._entries.append(Entry(f"targets/{number}/truth", time_us, pose))
         elif message.src_system < GROUND_SYSTEM:
-            self._vehicle(message).truth = time_us, place_ned_m, q
+            vehicle = self._vehicle(message)
+            vehicle.truth_before, vehicle.truth = vehicle.truth, _True(time_us, place_ned_m, q)
             self._add(
                 message, "truth", time_us, Pose(pos_ned_m=place_ned_m, q_ned_from_frd=q, role=Role.TRUTH)
             )
@@ -327,7 +346,7 @@ class MessageScene:
                 text = Text(text=f"GPS: {state}", state=state, warning=not has_fix)
                 self._add(message, "gps/fix", time_us, text)
             vehicle.has_fix = has_fix
-        if message.satellites_visible != _UNKNOWN_SATELLITES and self._is_due(time_us, message):
+        if message.satellites_visible != _UNKNOWN_SATELLITES:
             satellites = Value(value=float(message.satellites_visible))
             self._add(message, "gps/satellites", time_us, satellites)
 
@@ -335,19 +354,17 @@ class MessageScene:
         self._vehicle(message).accuracy_m = message.pos_horiz_accuracy
 
     def _air_data(self, time_us: int, message: wire.VFR_HUD) -> None:
-        if message.airspeed > 0.0 and self._is_due(time_us, message):
+        if message.airspeed > 0.0:
             self._add(message, "speed/air", time_us, Value(value=message.airspeed, unit="m/s"))
 
     def _battery(self, time_us: int, message: wire.SYS_STATUS) -> None:
-        if message.voltage_battery not in (0, UNKNOWN_UINT16) and self._is_due(time_us, message):
+        if message.voltage_battery not in (0, UNKNOWN_UINT16):
             self._add(message, "battery", time_us, Value(value=metres(message.voltage_battery), unit="V"))
 
     # commands
 
     def _setpoint(self, time_us: int, message: wire.POSITION_TARGET_GLOBAL_INT) -> None:
         if message.type_mask & _POSITION_IGNORED or not math.isfinite(message.alt):
-            return
-        if not self._is_due(time_us, message):
             return
         place_ned_m = self._ned(home(message.lat_int, message.lon_int, mm(message.alt)))
         if place_ned_m is not None:

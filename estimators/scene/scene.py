@@ -1,11 +1,14 @@
 """The scene of a recorded run or log, and what of it is shown at a time."""
 
 from bisect import bisect_right
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from estimators.logs.iterate import Selection, messages_in_order
 from estimators.observations import Image, observations_beside, read_observations
-from estimators.scene.messages import ORIGIN, MessageScene
+from estimators.scene.messages import ORIGIN, PERIOD_US, MessageScene
 from estimators.scene.placing import Assembly
 from estimators.scene.recording import read_scene, scene_beside
 from estimators.scene.shown import Shown
@@ -81,7 +84,7 @@ def entries_of_log(log: "Log", extra: Iterable[Shown] = ()) -> Iterator[Entry]:
     pending = sorted([*(read_scene(beside) if beside else ()), *extra], key=lambda shown: shown.time_us)
     names = sorted({key.name for key in log.keys} & MessageScene.NAMES)
     done = 0
-    for time_us, message in log.messages(names):
+    for time_us, message in messages_in_order(log.source, _thinned(log, log.select(names))):
         yield from scene.take(time_us, message)
         while done < len(pending) and pending[done].time_us <= scene.newest_us:
             yield from scene.show(pending[done])
@@ -93,6 +96,17 @@ def entries_of_log(log: "Log", extra: Iterable[Shown] = ()) -> Iterator[Entry]:
         for _, image in read_observations(images, (Image,)):
             assert isinstance(image, Image)
             yield from scene.image(image)
+
+
+def _thinned(log: "Log", selections: Sequence[Selection]) -> list[Selection]:
+    """The rows that the scene uses of messages that come often, chosen before they are decoded."""
+    found = []
+    for stream, rows in selections:
+        if stream.name in MessageScene.SAMPLED:
+            slots = log.source.time_us[stream.order[rows]] // PERIOD_US
+            rows = rows[np.append(True, slots[1:] != slots[:-1])]
+        found.append((stream, rows))
+    return found
 
 
 def _time_us(entry: Entry) -> int:

@@ -47,6 +47,7 @@ class OrbitFlight:
         )
         self._pilot: AttitudePilot | None = None
         self._gps: GpsSwitch | None = None
+        self._looking = False  # the target is followed
         self._captured_us: int | None = None
         self._near_us: int | None = None
         self._command: OrbitCommand | None = None
@@ -88,12 +89,14 @@ class OrbitFlight:
             self._begin("takeoff")
             await vehicle.takeoff(options.own_altitude_m)
             stops += self._observer.listen_to_payload()
+            self._looking = True
             looking = asyncio.get_running_loop().create_task(self._observer.keep_looking(pilot))
             try:
                 self._begin("transit")
                 await self._fly_to_entry(looking)
                 await self._orbit_without_gps(looking)
             finally:
+                self._looking = False
                 looking.cancel()
                 await asyncio.gather(looking, return_exceptions=True)
         finally:
@@ -116,7 +119,7 @@ class OrbitFlight:
         found["target_status"] = Text(text=known, state=self._tracker.status.value, role=Role.BELIEF)
         gps = "GPS" if self._observer.with_gps else "no GPS"
         found["navigation"] = Text(text=f"flown with {gps}", state=gps, warning=not self._observer.with_gps)
-        if target.known and math.isfinite(self._tracker.height_m):
+        if self._looking and target.known and math.isfinite(self._tracker.height_m):
             offset = *self._tracker.state(self._stamp_us).offset_ne_m, self._tracker.height_m
             place = Gaussian(mean_ned_m=offset, covariance_m2=target.offset_covariance_m2.copy(), label=known)
             circle = Line.circle((*offset[:2], 0.0), self._options.radius_m, label="orbit")

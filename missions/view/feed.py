@@ -27,11 +27,8 @@ _PERIOD_S: Final = 0.1  # wall time between two drawings
 _LAYOUT_EACH: Final = 20  # drawings
 _ENDS_WITHIN_S: Final = 15.0
 _LEAST_US: Final = 40_000  # between two samples of one sender, which are thinned further by the scene
-_EVENTS: Final = frozenset(
-    {"HEARTBEAT", "STATUSTEXT", "HOME_POSITION", "SYSTEM_TIME", "MISSION_COUNT", "MISSION_ITEM_INT"}
-)
 _IDS: Final = frozenset(i for i, found in DEFINITIONS.items() if found.name in MessageScene.NAMES)
-_SAMPLED: Final = _IDS - {i for i, found in DEFINITIONS.items() if found.name in _EVENTS}
+_SAMPLED: Final = frozenset(i for i in _IDS if DEFINITIONS[i].name in MessageScene.SAMPLED)
 """Messages of which a few a second are enough."""
 
 

@@ -91,8 +91,6 @@ class RerunDrawer:
         self._poses: set[str] = set()
         self._draws: dict[type[Any], Callable[[str, Any], None]] = {
             Line: self._line,
-            PointSet: self._points,
-            Gaussian: self._gaussian,
             Field: self._field,
             Camera: self._camera,
             Picture: self._picture,
@@ -100,24 +98,26 @@ class RerunDrawer:
             Cleared: self._cleared,
             Origin: self._origin,
         }
+        self._draws_columns: dict[type[Any], Callable[[str, Sequence[Entry]], None]] = {
+            Pose: self._draw_poses,
+            PointSet: self._draw_points,
+            Gaussian: self._draw_gaussians,
+            Value: self._draw_values,
+        }
         recording.log("/", rr.ViewCoordinates.FRD, static=True)  # north, east, down
 
     def draw(self, entries: Sequence[Entry]) -> None:
         """Draw entries; many at once cost less."""
-        values: dict[str, list[Entry]] = {}
-        poses: dict[str, list[Entry]] = {}
+        columns: dict[tuple[str, type[Any]], list[Entry]] = {}
         for entry in entries:
-            if isinstance(entry.item, Value):
-                values.setdefault(entry.path, []).append(entry)
-            elif isinstance(entry.item, Pose):
-                poses.setdefault(entry.path, []).append(entry)
+            kind = type(entry.item)
+            if kind in self._draws_columns:
+                columns.setdefault((entry.path, kind), []).append(entry)
             else:
                 self._recording.set_time(TIMELINE, duration=entry.time_us * 1e-6)
-                self._draws[type(entry.item)](entry.path, entry.item)
-        for path, own in poses.items():
-            self._draw_poses(path, own)
-        for path, own in values.items():
-            self._draw_values(path, own)
+                self._draws[kind](entry.path, entry.item)
+        for (path, kind), own in columns.items():
+            self._draws_columns[kind](path, own)
         self._scale_axes()
 
     def lay_out(self) -> None:
@@ -135,8 +135,7 @@ class RerunDrawer:
         items = [entry.item for entry in entries if isinstance(entry.item, Pose)]
         times = self._times(entries)
         places = np.array([item.pos_ned_m for item in items])
-        for place in places.tolist():
-            self._extent.take(*place)
+        self._take_all(places)
         columns = rr.Transform3D.columns(
             translation=places,
             quaternion=[_xyzw(item.q_ned_from_frd or (1.0, 0.0, 0.0, 0.0)) for item in items],
@@ -176,8 +175,12 @@ class RerunDrawer:
         trail = f"{head}/{TRAIL}/{name}"
         if trail not in self._styled:
             self._styled.add(trail)
-            colour = colour_of(path, entries[0].item)
-            style = rr.LineStrips3D.from_fields(colors=[colour], radii=[rr.Radius.ui_points(1.2)])
+            item = entries[0].item
+            assert isinstance(item, Pose)
+            colour = colour_of(path, item)
+            style = rr.LineStrips3D.from_fields(
+                colors=[colour], radii=[rr.Radius.ui_points(0.8 if item.role is Role.TRUTH else 1.6)]
+            )
             self._recording.log(trail, style, static=True)
             self._content.trails.add(trail)
         strips = rr.LineStrips3D.columns(strips=[np.array(leg) for leg in legs])
@@ -202,33 +205,43 @@ class RerunDrawer:
         self._recording.log(path, strip)
         self._content.places.add(path)
 
-    def _points(self, path: str, item: PointSet) -> None:
-        self._take_all(item.points_ned_m)
-        colours: Any = [colour_of(path, item)]
-        if len(item.weights) and item.role is Role.BELIEF:
-            colours = colour_scale(item.weights, 0.0, max(float(item.weights.max()), 1e-300))
-        radius = rr.Radius.ui_points(5.0 if item.role is Role.FOUND else 2.5)
-        points = rr.Points3D(
-            item.points_ned_m, colors=colours, radii=[radius], labels=list(item.labels) or None
-        )
-        self._recording.log(path, points)
-        self._content.places.add(path)
+    def _draw_points(self, path: str, entries: Sequence[Entry]) -> None:
+        items = [entry.item for entry in entries if isinstance(entry.item, PointSet)]
+        points = np.concatenate([item.points_ned_m for item in items])
+        lengths = [len(item.points_ned_m) for item in items]
+        self._take_all(points)
+        first = items[0]
+        if path not in self._styled:
+            self._styled.add(path)
+            radius = rr.Radius.ui_points(5.0 if first.role is Role.FOUND else 2.5)
+            style = rr.Points3D.from_fields(radii=[radius])
+            self._recording.log(path, style, static=True)
+            self._content.places.add(path)
+        colours = np.concatenate([_point_colours(path, item) for item in items])
+        labels: list[str] = []
+        for item, length in zip(items, lengths, strict=True):
+            labels += item.labels if len(item.labels) == length else [""] * length
+        found = rr.Points3D.columns(positions=points, colors=colours, labels=labels if any(labels) else None)
+        self._recording.send_columns(path, [self._times(entries)], found.partition(lengths))
 
-    def _gaussian(self, path: str, item: Gaussian) -> None:
-        outline = item.outline_ned_m()
-        self._take_all(np.array([item.mean_ned_m]))
-        strip = rr.LineStrips3D(
-            [np.concatenate([outline, outline[:1]])],
-            colors=[colour_of(path, item)],
-            radii=[rr.Radius.ui_points(1.5)],
-            labels=[gaussian_label(item)],
-        )
-        self._recording.log(path, strip)
-        middle = rr.Points3D(
-            [item.mean_ned_m], colors=[colour_of(path, item)], radii=[rr.Radius.ui_points(4.0)]
-        )
-        self._recording.log(f"{path}/mean", middle)
-        self._content.places.add(path)
+    def _draw_gaussians(self, path: str, entries: Sequence[Entry]) -> None:
+        items = [entry.item for entry in entries if isinstance(entry.item, Gaussian)]
+        means = np.array([item.mean_ned_m for item in items])
+        self._take_all(means)
+        if path not in self._styled:
+            self._styled.add(path)
+            colour = colour_of(path, items[0])
+            line = rr.LineStrips3D.from_fields(colors=[colour], radii=[rr.Radius.ui_points(1.5)])
+            self._recording.log(path, line, static=True)
+            middle = rr.Points3D.from_fields(colors=[colour], radii=[rr.Radius.ui_points(4.0)])
+            self._recording.log(f"{path}/mean", middle, static=True)
+            self._content.places.add(path)
+        times = [self._times(entries)]
+        outlines = [item.outline_ned_m() for item in items]
+        strips = [np.concatenate([outline, outline[:1]]) for outline in outlines]
+        labels = [gaussian_label(item) for item in items]
+        self._recording.send_columns(path, times, rr.LineStrips3D.columns(strips=strips, labels=labels))
+        self._recording.send_columns(f"{path}/mean", times, rr.Points3D.columns(positions=means))
 
     def _field(self, path: str, item: Field) -> None:
         rows, columns = item.values.shape
@@ -346,6 +359,13 @@ def field_image(item: Field) -> NDArray[np.uint8]:
     last row.
     """
     return np.ascontiguousarray(colour_scale(item.values, *item.scale).transpose(1, 0, 2)[::-1])
+
+
+def _point_colours(path: str, item: PointSet) -> NDArray[np.uint8]:
+    """Of each point: by its weight in a belief, else that of the item."""
+    if len(item.weights) == len(item.points_ned_m) and len(item.weights) and item.role is Role.BELIEF:
+        return colour_scale(item.weights, 0.0, max(float(item.weights.max()), 1e-300))
+    return np.tile(np.array([*colour_of(path, item), 255], dtype=np.uint8), (len(item.points_ned_m), 1))
 
 
 def _xyzw(q: Quaternion) -> rr.Quaternion:

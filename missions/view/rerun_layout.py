@@ -12,6 +12,7 @@ from flightsim.foundation.vectors import Vector
 __all__ = ["Content", "layout"]
 
 _MOST_PLOTS: Final = 6  # in a tab
+_UNITS: Final = ("m", "deg", "m/s")
 _MARGIN: Final = 1.25
 _WHOLE: Final = rrb.TimeAxis(
     view_range=rrb.TimeRange(start=rrb.TimeRangeBoundary.infinite(), end=rrb.TimeRangeBoundary.infinite())
@@ -113,7 +114,8 @@ def _maps(content: Content, timeline: str, extent: tuple[Vector, Vector] | None)
 def _plots(content: Content) -> list[Any]:
     """Tabs by what the series are of, errors first, with a plot for each unit."""
     groups: dict[str, dict[str, list[str]]] = {}
-    for path, item in sorted(content.series.items()):
+    by_unit = sorted(content.series.items(), key=lambda own: (_unit_rank(own[1].unit), own[0]))
+    for path, item in by_unit:
         group = "errors" if item.error else _group(path)
         groups.setdefault(group, {}).setdefault(item.unit or path.rpartition("/")[2], []).append(path)
     names = sorted(groups, key=lambda name: (name != "errors", name))
@@ -135,6 +137,11 @@ def _plots_of(by_unit: Mapping[str, Sequence[str]], content: Content) -> list[An
             )
         )
     return views
+
+
+def _unit_rank(unit: str) -> int:
+    """Heights and distances are above angles, speeds and the rest."""
+    return _UNITS.index(unit) if unit in _UNITS else len(_UNITS)
 
 
 def _group(path: str) -> str:
