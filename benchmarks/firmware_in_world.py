@@ -1,7 +1,7 @@
 """The missions in one world under three autopilots: real PX4, real ArduPilot, and their emulations.
 
     python -m benchmarks.firmware_in_world --out FOLDER [--firmware px4=BUILD] [--firmware ardupilot=FILE]
-        [--mission orbit] [--vehicle plane] [--seed 1] [--flights 2]
+        [--mission orbit] [--vehicle plane] [--autopilot real] [--seed 1] [--flights 2]
 
 Each mission is flown as a user flies it: `flightstack fly MISSION --firmware ...`, and the same without
 `--firmware`. World, seed, vehicle and airframe parameters are the same, so what differs is the autopilot
@@ -38,18 +38,22 @@ MISSIONS: Final[Mapping[str, Mapping[str, tuple[str, ...]]]] = {
     "sector": {"copter": ("--size", "80"), "plane": ("--size", "1000")},
     "orbit": {"plane": ("--duration", "120")},
     "occupancy": {
-        "copter": ("--size", "400", "--altitude", "50", "--identify", "bayes"),
-        "plane": ("--size", "1200", "--identify", "bayes"),
+        "copter": ("--size", "200", "--altitude", "50", "--identify", "bayes"),
+        "plane": ("--size", "800", "--identify", "bayes"),
     },
-    "multi-target": {"copter": ("--steps", "60"), "plane": ("--steps", "40")},
-    "vision-search": {"copter": ("--vehicles", "2")},
-    "survey": {"plane": ("--size", "600", "--spacing", "100")},
+    "multi-target": {
+        "copter": ("--steps", "20", "--area=-50,-50,50,50", "--targets", "4"),
+        "plane": ("--steps", "20"),
+    },
+    "vision-search": {"copter": ("--vehicles", "2", "--area=-60,-60,60,60")},
+    "survey": {"plane": ("--size", "400", "--spacing", "100")},
     "handoff": {"plane": ("--vehicles", "2")},
     "plan-file": {"copter": ("--home", f"{HOME[0]},{HOME[1]},488")},
     "own-script": {"copter": ()},
 }
 """Options of the missions by the vehicles that fly them."""
 FILES: Final = {"plan-file": PLAN, "own-script": "examples/own_mission.py"}
+REAL: Final = "real"
 EMULATED: Final = "emulated"
 _LIMIT_S: Final = 7200.0
 _LEFT_OUT: Final = (
@@ -67,7 +71,7 @@ Row = dict[str, Any]
 
 def fly(out: Path, mission: str, vehicle: str, firmware: str, build: FirmwareBuild | None, seed: int) -> Row:
     """Fly one mission; its row."""
-    name = f"{mission}-{vehicle}-{firmware}-{'emulated' if build is None else 'real'}-{seed}"
+    name = f"{mission}-{vehicle}-{firmware}-{EMULATED if build is None else REAL}-{seed}"
     folder = out / name
     flown = FILES.get(mission, mission)
     if flown == PLAN:
@@ -91,7 +95,7 @@ def fly(out: Path, mission: str, vehicle: str, firmware: str, build: FirmwareBui
         "mission": mission,
         "vehicle": vehicle,
         "firmware": firmware,
-        "autopilot": EMULATED if build is None else "real",
+        "autopilot": EMULATED if build is None else REAL,
         "seed": seed,
         "exit_code": code,
         "outcome": summary.get("outcome", "not ended"),
@@ -157,6 +161,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--firmware", action="append", metavar="NAME[=BUILD]", help="repeat; default: both")
     parser.add_argument("--mission", action="append", choices=MISSIONS, help="repeat; default: all")
     parser.add_argument("--vehicle", choices=VEHICLES)
+    parser.add_argument("--autopilot", choices=(REAL, EMULATED), help="default: both")
     parser.add_argument("--seed", type=int, default=0, help="of the first flight")
     parser.add_argument("--flights", type=int, default=1, help="of each cell, with the seeds that follow")
     chosen = parser.parse_args(arguments)
@@ -171,8 +176,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for mission, vehicle, build in wanted:
         for seed in range(chosen.seed, chosen.seed + chosen.flights):
             for flown in (build, None):
-                autopilot = EMULATED if flown is None else "real"
+                autopilot = EMULATED if flown is None else REAL
                 if (mission, vehicle, build.firmware, autopilot, seed) in known:
+                    continue
+                if chosen.autopilot not in (None, autopilot):
                     continue
                 row = fly(chosen.out, mission, vehicle, build.firmware, flown, seed)
                 rows.append(row)
@@ -191,8 +198,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     }
     return int(
         any(
-            row["outcome"] != same.get((row["mission"], row["vehicle"], row["firmware"], row["seed"]))
+            row["outcome"] != same.get(key, "completed")
             for row in rows
+            for key in ((row["mission"], row["vehicle"], row["firmware"], row["seed"]),)
             if row["autopilot"] != EMULATED
         )
     )

@@ -105,6 +105,7 @@ class FlightParameters(Options):
     return_altitude_m: Positive = 30.0  # RTL_RETURN_ALT | RTL_ALT, above home
     return_descend_altitude_m: NotNegative = 10.0  # RTL_DESCEND_ALT | RTL_ALT_FINAL, above home
     return_loiter_time_s: Finite = 0.0  # RTL_LAND_DELAY | RTL_LOIT_TIME; negative (PX4 -1): hold, don't land
+    return_stops: bool = False  # ArduPilot stops after the climb, over home and before the landing
     return_loiters_high: bool = False  # ArduPilot waits before it descends, PX4 at the descend altitude
     return_speed_m_s: Positive = 5.0  # MPC_XY_CRUISE | RTL_SPEED
     return_cone_half_angle_rad: NotNegative = math.radians(

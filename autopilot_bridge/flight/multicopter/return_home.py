@@ -123,10 +123,12 @@ class ReturnTask(HomewardTask):
         self._land.activate(ctx)
 
     def _close(self, ctx: FlightContext, motion: SmoothMotion, horizontal_m: float) -> bool:
+        p = ctx.multicopter
         position = ctx.nav[nav_layout.POS_NED_M]
         away = math.hypot(float(position[0] - self._target[0]), float(position[1] - self._target[1]))
         height_error = abs(float(position[2] - self._target[2]))
-        return away < horizontal_m and height_error < ctx.multicopter.acceptance_altitude_m and motion.stopped
+        reached = away < horizontal_m and height_error < p.acceptance_altitude_m
+        return reached and (motion.stopped or not p.return_stops)
 
     def _advance(self, ctx: FlightContext, motion: SmoothMotion, place: ReturnPlace) -> None:
         """Begin the next phase when this one is finished."""
