@@ -217,6 +217,19 @@ def test_return_climbs_flies_home_and_lands(loiters_high: bool) -> None:
     assert np.linalg.norm(track[-1, 0:2]) < 0.5
 
 
+@pytest.mark.parametrize("stops", [False, True])
+def test_a_return_goes_on_at_the_height_of_the_landing_or_stops_there(stops: bool) -> None:
+    """PX4 1.16.1 passes RTL_DESCEND_ALT at 1.0 m/s, without a wait; ArduPilot stops."""
+    limits = FlightParameters(return_altitude_m=9.0, return_descend_altitude_m=5.0, return_stops=stops)
+    rig = flying(GotoTask(np.array([4.0, 0.0, -9.0])), height_m=9.0, parameters=limits)
+    rig.run(6.0)
+    rig.fly(ReturnTask())
+    log = rig.run(25.0)
+    near = np.abs(positions(log)[:, 2] + 5.0) < 0.5
+    slowest_m_s = velocities(log)[near, 2].min()
+    assert (slowest_m_s < 0.2) if stops else (slowest_m_s > 0.4), slowest_m_s
+
+
 def test_return_without_home_lands_here() -> None:
     rig = flying(ReturnTask(), height_m=5.0)
     rig.ctx.home_ned_m[:] = math.nan

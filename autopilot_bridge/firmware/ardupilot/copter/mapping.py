@@ -166,11 +166,7 @@ def rally_rule(store: ParameterStore, *, within_fence: bool) -> RallyRule:
 
 def flight_parameters(store: ParameterStore) -> FlightParameters:
     """WPNAV_*, RTL_*, LAND_*, LOIT_*, PILOT_*, CIRCLE_*, GUID_TIMEOUT."""
-    fixed: dict[str, object] = {
-        "use_waypoint_yaw": False,
-        "return_loiters_high": True,
-        "return_stops": True,
-    }
+    fixed: dict[str, object] = {"use_waypoint_yaw": False, "return_loiters_high": True, "return_stops": True}
     climb_m_s = store.limited("PILOT_SPEED_UP") * _CM
     descend_m_s = store.limited("PILOT_SPEED_DN") * _CM
     fixed["manual_descend_speed_m_s"] = descend_m_s or climb_m_s  # 0: as fast as up
