@@ -43,7 +43,6 @@ ORIGIN: Final = "origin"
 PERIOD_US: Final = 100_000
 """Of the samples that are shown of messages that come often."""
 _MOST_STEP_US: Final = 500_000  # of the truth that errors are taken from
-_AHEAD_US: Final = 50_000
 _WITHOUT_HOME_US: Final = 10_000_000
 _FIX_3D: Final = 3
 _UNKNOWN_SATELLITES: Final = 255
@@ -71,6 +70,8 @@ class _Vehicle:
     place_ned_m: Vector | None = None
     truth: _True | None = None
     truth_before: _True | None = None
+    reported_place: tuple[int, Vector] | None = None
+    reported_attitude: tuple[int, Quaternion] | None = None
     accuracy_m: float = math.nan
     mode: str = ""
     armed: bool | None = None
@@ -78,12 +79,12 @@ class _Vehicle:
     texts: StatusTextAssembler = field(default_factory=StatusTextAssembler)
 
     def truth_at(self, time_us: int) -> _True | None:
-        """The true state at a time near the newest two: on the line through them; None: not known then."""
+        """The true state at a time between the newest two; None: not known then."""
         before, newest = self.truth_before, self.truth
         if before is None or newest is None:
             return None
         step_us = newest.time_us - before.time_us
-        if not 0 < step_us <= _MOST_STEP_US or abs(time_us - newest.time_us) > step_us + _AHEAD_US:
+        if not 0 < step_us <= _MOST_STEP_US or not before.time_us <= time_us <= newest.time_us:
             return None
         share = (time_us - before.time_us) / step_us
         place = tuple(a + share * (b - a) for a, b in zip(before.pos_ned_m, newest.pos_ned_m, strict=True))
@@ -234,21 +235,13 @@ class MessageScene:
         if math.isfinite(message.roll + message.pitch + message.yaw):
             vehicle = self._vehicle(message)
             vehicle.q_ned_from_frd = from_euler(message.roll, message.pitch, message.yaw)
-            self._attitude_error(time_us, message, vehicle)
+            vehicle.reported_attitude = time_us, vehicle.q_ned_from_frd
 
     def _attitude_quaternion(self, time_us: int, message: wire.ATTITUDE_QUATERNION) -> None:
         q = unit_quaternion((message.q1, message.q2, message.q3, message.q4))
         if q is not None:
             vehicle = self._vehicle(message)
             vehicle.q_ned_from_frd = q
-
-    def _attitude_error(self, time_us: int, message: Message, vehicle: _Vehicle) -> None:
-        truth = vehicle.truth_at(time_us)
-        if truth is None or vehicle.q_ned_from_frd is None:
-            return
-        difference = product(conjugate(truth.q_ned_from_frd), vehicle.q_ned_from_frd)
-        angle_deg = math.degrees(2.0 * math.acos(min(1.0, abs(difference[0]))))
-        self._add(message, "error/attitude", time_us, Value(value=angle_deg, unit="deg", error=True))
 
     def _position(self, time_us: int, message: wire.GLOBAL_POSITION_INT) -> None:
         if message.lat == 0 and message.lon == 0:
@@ -271,11 +264,7 @@ class MessageScene:
         self._add(message, "height", time_us, Value(value=-place_ned_m[2], unit="m"))
         speed_m_s = math.hypot(m_s(message.vx), m_s(message.vy))
         self._add(message, "speed/ground", time_us, Value(value=speed_m_s, unit="m/s"))
-        truth = vehicle.truth_at(time_us)
-        if truth is not None:
-            error_m = math.dist(place_ned_m[:2], truth.pos_ned_m[:2])
-            found_error = Value(value=error_m, unit="m", sigma=vehicle.accuracy_m, error=True)
-            self._add(message, "error/position", time_us, found_error)
+        vehicle.reported_place = time_us, place_ned_m
 
     # truth
 
@@ -313,9 +302,29 @@ class MessageScene:
         elif message.src_system < GROUND_SYSTEM:
             vehicle = self._vehicle(message)
             vehicle.truth_before, vehicle.truth = vehicle.truth, _True(time_us, place_ned_m, q)
+            self._errors(message, vehicle)
             self._add(
                 message, "truth", time_us, Pose(pos_ned_m=place_ned_m, q_ned_from_frd=q, role=Role.TRUTH)
             )
+
+    def _errors(self, message: Message, vehicle: _Vehicle) -> None:
+        """Errors of what was reported before the newest truth, at its own time."""
+        if vehicle.reported_place is not None:
+            at_us, place_ned_m = vehicle.reported_place
+            truth = vehicle.truth_at(at_us)
+            if truth is not None:
+                vehicle.reported_place = None
+                error_m = math.dist(place_ned_m[:2], truth.pos_ned_m[:2])
+                found = Value(value=error_m, unit="m", sigma=vehicle.accuracy_m, error=True)
+                self._add(message, "error/position", at_us, found)
+        if vehicle.reported_attitude is not None:
+            at_us, q = vehicle.reported_attitude
+            truth = vehicle.truth_at(at_us)
+            if truth is not None:
+                vehicle.reported_attitude = None
+                difference = product(conjugate(truth.q_ned_from_frd), q)
+                angle_deg = math.degrees(2.0 * math.acos(min(1.0, abs(difference[0]))))
+                self._add(message, "error/attitude", at_us, Value(value=angle_deg, unit="deg", error=True))
 
     # state
 

@@ -1,21 +1,25 @@
 """Gives what is shown its place on the scene, by what the messages say about vehicles and origins."""
 
+from typing import Final
+
 import numpy as np
 
 from estimators.messages import Message
 from estimators.observations import Image
 from estimators.scene.estimates import items_of
-from estimators.scene.messages import MessageScene
+from estimators.scene.messages import PERIOD_US, MessageScene
 from estimators.scene.shown import Estimates, Shown
 from estimators.scene_items import Camera, Entry, Item, Picture, Placed, Relative
 
 __all__ = ["Assembly", "placed"]
 
+_TRUTH_WITHIN_US: Final = 2 * PERIOD_US
+
 
 class Assembly:
     """Assembles a scene of messages and of what is shown, in the order in which they come.
 
-    What is shown before the scene has an origin waits for it.
+    What is shown before the scene has an origin waits for it, and estimates wait for the truth of their time.
     """
 
     def __init__(self) -> None:
@@ -30,18 +34,38 @@ class Assembly:
     def take(self, time_us: int, message: Message) -> list[Entry]:
         """The entries of a message at a vehicle time, and of what has waited for it."""
         entries = self._messages.take(time_us, message)
-        if self._waiting and self._messages.origin is not None:
-            waiting, self._waiting = self._waiting, []
-            for shown in waiting:
-                entries += placed(shown, self._messages)
-        return entries
+        return entries + self._ready() if self._waiting else entries
 
     def show(self, shown: Shown) -> list[Entry]:
         """The entries of what is shown."""
+        self._waiting.append(shown)
+        return self._ready()
+
+    def rest(self) -> list[Entry]:
+        """The entries of what still waits, when nothing more comes."""
+        waiting, self._waiting = self._waiting, []
         if self._messages.origin is None:
-            self._waiting.append(shown)
             return []
-        return placed(shown, self._messages)
+        return [entry for shown in waiting for entry in placed(shown, self._messages)]
+
+    def _ready(self) -> list[Entry]:
+        """The entries of what need not wait any more."""
+        if self._messages.origin is None:
+            return []
+        ready = [shown for shown in self._waiting if self._is_ready(shown)]
+        if not ready:
+            return []
+        self._waiting = [shown for shown in self._waiting if not self._is_ready(shown)]
+        return [entry for shown in ready for entry in placed(shown, self._messages)]
+
+    def _is_ready(self, shown: Shown) -> bool:
+        """Estimates wait for the truth of their time."""
+        if not isinstance(shown.item, Estimates):
+            return True
+        timeline, time_us = self._messages.timeline, shown.time_us
+        if shown.subject.system_id:
+            time_us = timeline.common_us(time_us, shown.subject.system_id)
+        return timeline.newest_us >= time_us + _TRUTH_WITHIN_US
 
     def image(self, image: Image) -> list[Entry]:
         """The entries of a camera's image: the picture, and the camera where its place is known."""

@@ -91,6 +91,7 @@ def entries_of_log(log: "Log", extra: Iterable[Shown] = ()) -> Iterator[Entry]:
             done += 1
     for shown in pending[done:]:
         yield from scene.show(shown)
+    yield from scene.rest()
     images = observations_beside(log.path)
     if images is not None:
         for _, image in read_observations(images, (Image,)):

@@ -104,6 +104,7 @@ class SceneFeed:
                 if drawings % _LAYOUT_EACH == 1:
                     self._viewer.lay_out()
             self._draw()
+            self._viewer.draw(self._scene.rest())
             self._viewer.finish()
         except (
             MissionError,

@@ -43,6 +43,7 @@ _TRAIL_STEP_S: Final = 0.5
 _JPEG_QUALITY: Final = 80
 _AXES_SHARE: Final = 0.03  # of the extent of what is shown
 _LEAST_AXES_M: Final = 1.0
+_GROWN: Final = 2.0
 _FRUSTUM_SHARE: Final = 0.08
 _GOOD: Final = rr.TextLogLevel.INFO
 _BAD: Final = rr.TextLogLevel.WARN
@@ -118,7 +119,8 @@ class RerunDrawer:
                 self._draws[kind](entry.path, entry.item)
         for (path, kind), own in columns.items():
             self._draws_columns[kind](path, own)
-        self._scale_axes()
+        if entries:
+            self._scale_axes(entries[-1].time_us)
 
     def lay_out(self) -> None:
         """Send the layout of the views that suits what was drawn, if it has changed."""
@@ -148,11 +150,13 @@ class RerunDrawer:
             label = item.label or _pose_label(path, item)
             radius = rr.Radius.ui_points(4.0 if item.role is Role.TRUTH else 6.0)
             point = rr.Points3D([(0.0, 0.0, 0.0)], colors=[colour], radii=[radius], labels=[label])
-            self._recording.log(path, point, static=True)
+            # Not static, so that it can be cleared.
+            self._recording.set_time(TIMELINE, duration=entries[0].time_us * 1e-6)
+            self._recording.log(path, point)
             self._content.places.add(path)
             if item.q_ned_from_frd is not None:
                 self._poses.add(path)
-                self._extent.drawn_m = 0.0
+                self._recording.log(path, rr.TransformAxes3D(self._axes_m))
         self._draw_trail(path, entries)
 
     def _draw_trail(self, path: str, entries: Sequence[Entry]) -> None:
@@ -186,14 +190,18 @@ class RerunDrawer:
         strips = rr.LineStrips3D.columns(strips=[np.array(leg) for leg in legs])
         self._recording.send_columns(trail, [rr.TimeColumn(TIMELINE, duration=times_s)], strips)
 
-    def _scale_axes(self) -> None:
-        """Axes of the vehicles that are seen beside the largest thing that is shown."""
-        if self._extent.drawn_m >= 0.5 * self._extent.size_m and self._extent.drawn_m > 0.0:
+    @property
+    def _axes_m(self) -> float:
+        return max(_LEAST_AXES_M, _AXES_SHARE * self._extent.size_m)
+
+    def _scale_axes(self, time_us: int) -> None:
+        """Axes of the vehicles that are seen beside the largest thing that is shown, from a time on."""
+        if self._extent.size_m <= _GROWN * self._extent.drawn_m:
             return
-        self._extent.drawn_m = max(self._extent.size_m, _LEAST_AXES_M)
-        length_m = max(_LEAST_AXES_M, _AXES_SHARE * self._extent.drawn_m)
+        self._extent.drawn_m = self._extent.size_m
+        self._recording.set_time(TIMELINE, duration=time_us * 1e-6)
         for path in self._poses:
-            self._recording.log(path, rr.TransformAxes3D(length_m), static=True)
+            self._recording.log(path, rr.TransformAxes3D(self._axes_m))
 
     def _line(self, path: str, item: Line) -> None:
         self._take_all(item.points_ned_m)
@@ -298,6 +306,8 @@ class RerunDrawer:
 
     def _cleared(self, path: str, _item: Cleared) -> None:
         self._recording.log(path, rr.Clear(recursive=True))
+        self._styled.discard(path)
+        self._poses.discard(path)
 
     def _origin(self, path: str, item: Origin) -> None:
         place = (
