@@ -9,11 +9,12 @@ from estimators.observations import Image
 from estimators.scene.estimates import items_of
 from estimators.scene.messages import PERIOD_US, MessageScene
 from estimators.scene.shown import Estimates, Shown
-from estimators.scene_items import Camera, Entry, Item, Picture, Placed, Relative
+from estimators.scene_items import Camera, Cleared, Entry, Item, Picture, Placed, Relative, Text, Value
 
 __all__ = ["Assembly", "placed"]
 
 _TRUTH_WITHIN_US: Final = 2 * PERIOD_US
+_WITHOUT_PLACE: Final = (Value, Text, Picture, Cleared)
 
 
 class Assembly:
@@ -44,14 +45,10 @@ class Assembly:
     def rest(self) -> list[Entry]:
         """The entries of what still waits, when nothing more comes."""
         waiting, self._waiting = self._waiting, []
-        if self._messages.origin is None:
-            return []
         return [entry for shown in waiting for entry in placed(shown, self._messages)]
 
     def _ready(self) -> list[Entry]:
         """The entries of what need not wait any more."""
-        if self._messages.origin is None:
-            return []
         ready = [shown for shown in self._waiting if self._is_ready(shown)]
         if not ready:
             return []
@@ -59,9 +56,9 @@ class Assembly:
         return [entry for shown in ready for entry in placed(shown, self._messages)]
 
     def _is_ready(self, shown: Shown) -> bool:
-        """Estimates wait for the truth of their time."""
+        """Estimates wait for the truth of their time, and what has a place for the origin."""
         if not isinstance(shown.item, Estimates):
-            return True
+            return self._messages.origin is not None or isinstance(shown.item, _WITHOUT_PLACE)
         timeline, time_us = self._messages.timeline, shown.time_us
         if shown.subject.system_id:
             time_us = timeline.common_us(time_us, shown.subject.system_id)
@@ -112,6 +109,10 @@ def placed(shown: Shown, messages: MessageScene) -> list[Entry]:
 
 
 def _placed(item: Item, shown: Shown, messages: MessageScene) -> Placed | None:
+    if isinstance(item, _WITHOUT_PLACE):
+        return item
+    if messages.origin is None:
+        return None
     if isinstance(item, Relative):
         place = messages.place_of_vehicle(item.system_id)
         return None if place is None else item.item.moved(place)

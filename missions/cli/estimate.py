@@ -9,6 +9,7 @@ from estimators.names import ESTIMATORS
 from missions.cli.declared_options import declared_options
 from missions.cli.later import body_in
 from missions.cli.signing import key_option
+from missions.cli.view_option import view_option
 from missions.estimation.options import LiveOptions
 
 _BODIES: Final = "missions.cli.bodies.estimate"
@@ -31,6 +32,7 @@ are kept), 2 usage, 130 interrupted before --duration was over.
 @click.option("--publish/--no-publish", default=True, show_default=True, help="Send estimates on the link.")
 @click.option("--no-request", is_flag=True, help="No requests of the rates that are needed.")
 @click.option("--out", type=click.Path(path_type=Path), help="Run folder. [default: runs/ESTIMATOR-N]")
+@view_option()
 @click.option("--no-picture", is_flag=True, help="No picture errors.png.")
 @body_in(_BODIES)
 def estimate() -> None: ...

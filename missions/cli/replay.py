@@ -8,6 +8,7 @@ import click
 from estimators.names import ESTIMATORS
 from missions.cli.declared_options import declared_options
 from missions.cli.later import body_in
+from missions.cli.view_option import view_option
 from missions.estimation.options import ReplayOptions
 
 _BODIES: Final = "missions.cli.bodies.replay"
@@ -30,6 +31,7 @@ _BODIES: Final = "missions.cli.bodies.replay"
     type=click.Path(path_type=Path),
     help="Run folder, or folder of theirs. [default: runs/ESTIMATOR-N]",
 )
+@view_option()
 @click.option("--no-picture", is_flag=True, help="No picture errors.png.")
 @body_in(_BODIES)
 def replay() -> None:

@@ -20,17 +20,21 @@ from estimators.errors import EstimatorError
 from estimators.fleet import Fleet
 from estimators.interface import Estimator
 from estimators.library import estimator_class, parameters_from
+from estimators.logs import open_log
 from estimators.runner import Runner
 from missions.errors import LinkClosed
 from missions.estimation.options import LiveOptions
 from missions.estimation.rates import CHECK_PERIOD_S, RateWatch, interval_request
 from missions.estimation.report import EstimationResult, ReportRequest, report
+from missions.estimation.scene import SceneRecorder
 from missions.estimation.tap import TEAM_SYSTEM, EstimatorTap, Publisher
 from missions.flown.records import FlightRecorder
 from missions.flown.run_folder import LOG_NAME, create_run_folder
 from missions.process.ending import StopOnSignals
 from missions.vehicle.connection import Connection
 from missions.vehicle.signing import client_signing
+from missions.view.of_log import draw_log
+from missions.view.viewer import Viewer
 
 _LOOK_S: Final = 0.25
 
@@ -50,6 +54,8 @@ class LiveRequest(LiveOptions):
         command: the command line, for the summary.
         signing_key: shared with the vehicle; None: unsigned.
         on_open: called once the link is open.
+        view: an open viewer that shows the run; None: no viewer.
+        on_warning: receives why nothing more is drawn.
     """
 
     estimator: str
@@ -62,6 +68,8 @@ class LiveRequest(LiveOptions):
     command: str = ""
     signing_key: SigningKey | None = None
     on_open: Callable[[], object] = lambda: None
+    view: Viewer | None = None
+    on_warning: Callable[[str], object] = lambda _text: None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -92,6 +100,7 @@ class _Process:
         self._recorder = recorder
         self._publisher = Publisher(self._say)
         self._tap = EstimatorTap(recorder, fleet, self._on_estimate if request.publish else None, log=log)
+        self.scene = SceneRecorder(self._tap, fleet, log, request.view, request.on_warning)
         self._watch = RateWatch(fleet.needs, self._tap.received)
         self._look_us = 0
         self._stop = asyncio.Event()
@@ -102,7 +111,7 @@ class _Process:
         self.connection = Connection(
             link,
             self._clock,
-            self._tap,
+            self.scene,
             identity=(request.system_id or (TEAM_SYSTEM if fleet.team else 1), request.component_id),
             vehicle_system_id=request.system_id,
             signing=client_signing(request.signing_key),
@@ -271,8 +280,11 @@ def estimate(
                 run(process.run(on_progress), loop)
         finally:
             recorder.close()
+        process.scene.close()
     finally:
         link.close()
+    if request.view is not None and not request.view.live:
+        draw_log(open_log(folder / LOG_NAME), request.view, folder.name)
     # A full disk may show only when the last part of the log is written.
     reason = process.reason or recorder.failure or process.starvation
     interrupted = process.stopped and request.duration_s is not None

@@ -14,10 +14,15 @@ from estimators.log_replay import replay
 from estimators.logs import Log, LogError, open_log
 from estimators.logs.dialect import load_dialect
 from estimators.reports.summary import FAILED
+from estimators.runner import Runner
+from estimators.scene.of_estimators import EstimatorShows
+from estimators.scene.shown import Shown
 from missions.errors import PlanError
 from missions.estimation.options import ReplayOptions
 from missions.estimation.report import EstimationResult, ReportRequest, report
 from missions.flown.run_folder import RUNS, create_run_folder
+from missions.view.of_log import draw_log
+from missions.view.viewer import Viewer
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,6 +38,7 @@ class ReplayRequest(ReplayOptions):
             `runs/<estimator>-<n>`.
         picture: whether to draw `errors.png`.
         command: the command line, for the summaries.
+        view: an open viewer on which each log is drawn with what the estimator shows; None: no viewer.
     """
 
     logs: Sequence[Path]
@@ -42,6 +48,7 @@ class ReplayRequest(ReplayOptions):
     out: Path | None = None
     picture: bool = True
     command: str = ""
+    view: Viewer | None = None
 
     def check_together(self) -> None:
         if not self.logs:
@@ -95,10 +102,25 @@ def _replay_one(
     request: ReplayRequest, logs: list[Log], make: Callable[[], Estimator[Any]], name: str, *, several: bool
 ) -> EstimationResult:
     begun_s = wall_time_s()
+    shows, shown = EstimatorShows(name), list[Shown]()
+
+    def look(runner: Runner) -> None:
+        if request.view is not None:
+            shown.extend(shows.look_at(runner))
+
     done = replay(
-        logs, make, system_id=request.system_id, from_s=request.from_s, to_s=request.to_s, boot=request.boot
+        logs,
+        make,
+        system_id=request.system_id,
+        from_s=request.from_s,
+        to_s=request.to_s,
+        boot=request.boot,
+        on_estimate=look,
     )
     wall_s = wall_time_s() - begun_s
+    if request.view is not None:
+        for number, log in enumerate(logs):
+            draw_log(log, request.view, log.path.name, () if number else shown)
     failure = done.failure
     if request.system_id is not None and not done.supplies:
         ids = sorted(

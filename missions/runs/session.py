@@ -49,7 +49,6 @@ from missions.runs.results import (
 from missions.runs.run import Run
 from missions.runs.scene import FlightScene
 from missions.runs.vehicle_opening import VehicleOpener
-from missions.view.feed import SceneFeed
 from missions.view.of_log import draw_log
 from missions.view.viewer import Viewer, ViewError
 
@@ -178,8 +177,7 @@ def _fly_interruptible(
         flight.recorder = recorder
         inner = recorder if estimators is None else estimators.around(recorder, folder / LOG_NAME)
         fleet = None if estimators is None else estimators.fleet
-        feed = None if view is None or not view.live else SceneFeed(view, folder.name)
-        scene = FlightScene(inner, flight, fleet, folder / LOG_NAME, feed)
+        scene = FlightScene(inner, flight, fleet, folder / LOG_NAME, view)
         stage.on_truth(scene.record_truth)
         try:
             ending.run(

@@ -11,11 +11,13 @@ from estimators.reports.summary import FAILED, INTERRUPTED, table_lines, warning
 from missions.cli import exit_codes
 from missions.cli.bodies.signing import key_from, warn_if_open
 from missions.cli.bodies.status_line import StatusLine
+from missions.cli.bodies.viewing import viewing
 from missions.cli.declared_options import specified
 from missions.cli.options import in_options, report
 from missions.errors import PlanError
 from missions.estimation.live import LiveProgress, LiveRequest
 from missions.estimation.live import estimate as run_estimator
+from missions.view.viewer import Viewer, ViewError
 
 
 class _LiveProgressLine:
@@ -44,6 +46,14 @@ class _LiveProgressLine:
 
 def estimate(**given: Any) -> int:
     """`flightstack estimate`."""
+    try:
+        with viewing(given["view"]) as view:
+            return _estimated(given, view)
+    except ViewError as error:
+        raise click.ClickException(in_options(error)) from error
+
+
+def _estimated(given: dict[str, Any], view: Viewer | None) -> int:
     progress = _LiveProgressLine()
     try:
         key = key_from(given["signing_key"])
@@ -60,6 +70,8 @@ def estimate(**given: Any) -> int:
                 command=" ".join(["flightstack", *sys.argv[1:]]),
                 signing_key=key,
                 on_open=lambda: warn_if_open((given["connect"],), key),
+                view=view,
+                on_warning=report,
             ),
             progress,
         )

@@ -18,6 +18,7 @@ from missions.pattern_search.mission import PatternSearchFlight
 from missions.runs import session
 from missions.view import feed, opening, rerun_process
 from missions.view.target import ViewKind, ViewTarget, parse_view
+from tests.estimators.conftest import LEVEL
 
 
 class Drawn:
@@ -196,3 +197,16 @@ def test_a_log_without_a_position_is_drawn_and_said_to_have_no_map(view, log, tm
     assert code == 0 and line == f"{log} has no position, so that there is no map"
     code, line = view(log, "--view", tmp_path / "out.rrd")
     assert code == 1 and "out.rrd" in line and "\n" not in line  # nothing is overwritten
+
+
+def test_a_replay_is_drawn_with_what_its_estimator_shows(log, tmp_path, capsys):
+    pytest.importorskip("rerun", reason="Rerun is not installed: pip install 'flightstack[view]'")
+    from rerun.chunk import RrdReader
+
+    arguments = ["replay", log, "--estimator", LEVEL, "--out", tmp_path / "run", "--no-picture"]
+    assert cli.run_command_line([*map(str, arguments), "--view", str(tmp_path / "run.rrd")]) == 0
+    paths = {str(chunk.entity_path).strip("/") for chunk in RrdReader(tmp_path / "run.rrd").stream()}
+    assert "estimators/level/1/roll" in paths
+    assert "view: " in capsys.readouterr().out
+    code = cli.run_command_line([*map(str, [*arguments, log]), "--view", str(tmp_path / "two.rrd")])
+    assert code == 2 and "is one file for several logs" in capsys.readouterr().err
