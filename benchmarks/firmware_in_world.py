@@ -38,7 +38,7 @@ MISSIONS: Final[Mapping[str, Mapping[str, tuple[str, ...]]]] = {
     "sector": {"copter": ("--size", "80"), "plane": ("--size", "1000")},
     "orbit": {"plane": ("--duration", "120")},
     "occupancy": {
-        "copter": ("--size", "200", "--altitude", "50", "--identify", "bayes"),
+        "copter": ("--size", "300", "--cell", "100", "--altitude", "50", "--identify", "bayes"),
         "plane": ("--size", "800", "--identify", "bayes"),
     },
     "multi-target": {

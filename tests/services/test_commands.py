@@ -139,6 +139,8 @@ ARDUPILOT_TABLE = [
     (mavlink.MAV_CMD_DO_CONTROL_VIDEO, (), "ready", [3]),
     (mavlink.MAV_CMD_DO_SET_GLOBAL_ORIGIN, (), "ready", [3]),
     (mavlink.MAV_CMD_REQUEST_PROTOCOL_VERSION, (), "ready", [3]),
+    (mavlink.MAV_CMD_DO_LAND_START, (), "ready", [4]),
+    (mavlink.MAV_CMD_DO_PARACHUTE, (0,), "flying", [0]),
     (mavlink.MAV_CMD_DO_REPOSITION, (-1, 1, 0, 0, 47.4, 8.5, 10), "flying", [3]),
     (mavlink.MAV_CMD_DO_CHANGE_SPEED, (1, 5, -1), "flying", [0]),
     (mavlink.MAV_CMD_CONDITION_YAW, (90, 30, 1, 0), "flying", [0]),

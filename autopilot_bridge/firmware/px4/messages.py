@@ -228,6 +228,7 @@ class Px4Messages(CommonMessages):
             barometer_accuracy=dialect.MAV_ODID_VER_ACC_UNKNOWN,
             speed_accuracy=dialect.MAV_ODID_SPEED_ACC_1_METERS_PER_SECOND,
             timestamp=float(UNKNOWN_UINT16),
+            timestamp_accuracy=dialect.MAV_ODID_TIME_ACC_0_2_SECOND,  # a receiver's interval
         )
 
     @streams(_M.MAVLink_open_drone_id_system_message)

@@ -8,6 +8,7 @@ from autopilot_bridge.dispatch import command
 from autopilot_bridge.firmware.ardupilot.commands import ArduPilotCommands
 from autopilot_bridge.firmware.ardupilot.copter import modes as ardupilot_modes
 from autopilot_bridge.flight.heading import Turn
+from autopilot_bridge.flight.plan_reading import landing_start
 from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_wire import RELATIVE_FRAMES
 from autopilot_bridge.services.channel import Source
@@ -44,6 +45,24 @@ class ArduCopterCommands(ArduPilotCommands):
     def land(self, command: Command, source: Source) -> Result:
         """NAV_LAND: land at the current position."""
         return self.commander.guidance.land().result
+
+    @command(dialect.MAV_CMD_DO_LAND_START)
+    def land_start(self, command: Command, source: Source) -> Result:
+        """DO_LAND_START: enter AUTO RTL, which needs a landing sequence. With one it is not emulated."""
+        if landing_start(self.commander.missions.items) is not None:
+            return Result.UNSUPPORTED
+        for text in (
+            "Unable to start landing sequence",
+            "Mode change to AUTO RTL failed: No landing sequence found",
+        ):
+            self.parts.announce(dialect.MAV_SEVERITY_WARNING, text)
+        return Result.FAILED
+
+    @command(dialect.MAV_CMD_DO_PARACHUTE)
+    def parachute(self, command: Command, source: Source) -> Result:
+        """DO_PARACHUTE: to disable it is accepted without a parachute, too."""
+        disables = whole(command.p1) == dialect.PARACHUTE_DISABLE
+        return Result.ACCEPTED if disables else Result.UNSUPPORTED
 
     @command(dialect.MAV_CMD_CONDITION_YAW)
     def turn(self, command: Command, source: Source) -> Result:
