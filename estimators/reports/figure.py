@@ -1,12 +1,13 @@
 """Figures for the files of a run. matplotlib is imported when the first is made: most runs need none."""
 
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["INK", "blank_figure", "save_figure", "tidy"]
+__all__ = ["INK", "blank_figure", "label_of", "save_figure", "tidy"]
 
 INK: Final = "#1f2937"
 """Colour of texts."""
@@ -35,6 +36,31 @@ def save_figure(figure: "Figure", path: Path) -> None:
     """
     with path.open("xb") as file:
         figure.savefig(file, format="png", metadata={"Software": None})
+
+
+_UNITS: Final = {
+    "m_s2": "m/s\u00b2", "m2_s2": "m\u00b2/s\u00b2", "rad_s2": "rad/s\u00b2", "m_s": "m/s", "rad_s": "rad/s",
+    "deg_s": "deg/s", "deg2": "deg\u00b2", "rad2": "rad\u00b2", "m2": "m\u00b2", "deg": "deg", "rad": "rad",
+    "m": "m", "s": "s", "us": "\u00b5s", "hz": "Hz", "px": "pixels", "nt": "nT", "pa": "Pa", "v": "V",
+    "nats": "nats",
+}  # fmt: skip
+"""Units as the ends of names have them, the longest first where one ends another."""
+_WORDS: Final = {
+    "rms": "RMS",
+    "gps": "GPS",
+    "ospa": "OSPA",
+    "gospa": "GOSPA",
+    "pod": "POD",
+    "ne": "north east",
+}
+
+
+def label_of(name: str) -> str:
+    """The name of a quantity in words, with its unit: "path RMS error, m" of `path_rms_error_m`."""
+    end = next((end for end in _UNITS if name.endswith(f"_{end}")), "")
+    words = re.split(r"[_.\s-]+", name.removesuffix(f"_{end}") if end else name)
+    text = " ".join(_WORDS.get(word, word) for word in words)
+    return f"{text}, {_UNITS[end]}" if end else text
 
 
 def tidy(axes: Any) -> None:

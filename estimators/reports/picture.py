@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from estimators.comparison import Comparison
 from estimators.references import AUTOPILOT, TRUTH, quantity_of
-from estimators.reports.figure import INK, blank_figure, save_figure, tidy
+from estimators.reports.figure import INK, blank_figure, label_of, save_figure, tidy
 from flightsim.foundation.vectors import wrap_pi
 
 _ESTIMATE: Final = "#c2410c"
@@ -62,8 +62,10 @@ def draw_errors(path: Path, title: str, compared: Sequence[Comparison]) -> None:
     grid = figure.add_gridspec(len(heights), 1, height_ratios=heights)
     several = len({c.label for c, _ in [*shown, *alone]}) > 1
     below: Any = None
+    first: Any = None  # all panels share its time axis
     for k, (c, column) in enumerate(shown):
-        above = figure.add_subplot(grid[2 * k])
+        above = figure.add_subplot(grid[2 * k], sharex=first)
+        first = first or above
         below = figure.add_subplot(grid[2 * k + 1], sharex=above)
         _draw_quantity(above, below, c, column, c.label if several else "")
         above.tick_params(labelbottom=False)
@@ -72,12 +74,12 @@ def draw_errors(path: Path, title: str, compared: Sequence[Comparison]) -> None:
         tidy(above)
         tidy(below)
     for k, (c, column) in enumerate(alone):
-        below = figure.add_subplot(grid[2 * len(shown) + k])
+        below = figure.add_subplot(grid[2 * len(shown) + k], sharex=first)
+        first = first or below
         _draw_alone(below, c, column, c.label if several else "")
         if k == 0 and not shown:
             _legend(below, c)
         tidy(below)
-    first: Any = None
     for k, (members, column) in enumerate(together):
         below = figure.add_subplot(grid[2 * len(shown) + len(alone) + k], sharex=first)
         first = first or below
@@ -163,7 +165,7 @@ def _draw_alone(axes: Any, c: Comparison, column: str, label: str) -> None:
 
 def _axis_label(label: str, quantity: str, unit: str) -> str:
     """Such as "vehicle 2 offset north, m": the name of a column in words, with its unit if it has one."""
-    words = f"{label} {quantity.replace('_', ' ')}".strip()
+    words = f"{label} {label_of(quantity)}".strip()
     return f"{words}, {unit}" if unit else words
 
 
@@ -174,7 +176,7 @@ def _draw_together(axes: Any, members: Sequence[Comparison], column: str, *, leg
         values = factor * (wrap_pi(c.estimates[column]) if column.endswith("_rad") else c.estimates[column])
         axes.plot(_continuous_s(c), values, ".", markersize=5, label=c.label)
     written = _UNITS.get(unit, unit)
-    axes.set_ylabel(f"{name}{', ' if written else ''}{written}", fontsize=8, color=INK)
+    axes.set_ylabel(_axis_label("", name, written), fontsize=8, color=INK)
     if legend:
         axes.legend(
             loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=min(6, len(members)), fontsize=8, frameon=False

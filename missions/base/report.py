@@ -53,6 +53,7 @@ class Report:
         lines: what the command line prints after a completed flight, besides the lines of every flight.
         title: first words of the picture's title; "": the mission's name.
         draw: draws `track.png` (path, title); None: the picture of every flight.
+        overlay: draws more on the axes of the track from above in the picture of every flight.
         files: further files of the run folder: contents by name.
         pictures: makes further pictures and videos, by name; they are left out where the run draws none.
     """
@@ -62,6 +63,7 @@ class Report:
     lines: Sequence[str] = ()
     title: str = ""
     draw: Callable[[Path, str], None] | None = None
+    overlay: Callable[[Any], object] | None = None
     files: Mapping[str, bytes] = field(default_factory=dict)
     pictures: Callable[[], Mapping[str, bytes]] = dict
 
@@ -75,6 +77,7 @@ class Report:
         figures: Mapping[str, Any] = MappingProxyType({}),
         title: str = "",
         draw: Callable[[Path, str], None] | None = None,
+        overlay: Callable[[Any], object] | None = None,
         files: Mapping[str, bytes] = MappingProxyType({}),
         pictures: Callable[[], Mapping[str, bytes]] = dict,
     ) -> Self:
@@ -84,7 +87,7 @@ class Report:
         Args:
             debriefing: of the flight.
             verdict: None: by the commanded paths, where there are any.
-            lines, figures, title, draw, files, pictures: the other attributes.
+            lines, figures, title, draw, overlay, files, pictures: the other attributes.
         """
         text = ""
         if debriefing.completed:
@@ -95,6 +98,7 @@ class Report:
             lines=lines() if debriefing.completed and not text else (),
             title=title,
             draw=draw,
+            overlay=overlay,
             files=files,
             pictures=pictures,
         )

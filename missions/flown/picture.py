@@ -1,6 +1,7 @@
 """The picture of a run: the track from above, and below it altitude and error over time."""
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
@@ -22,7 +23,12 @@ _LEAST_SPAN_M: Final = 10.0
 _PHASE: Final = "#f3f4f6"
 
 
-def draw_run(path: Path, title: str, flights: list[tuple[FlightNotes, FlightScore]]) -> None:
+def draw_run(
+    path: Path,
+    title: str,
+    flights: list[tuple[FlightNotes, FlightScore]],
+    overlay: Callable[[Any], object] | None = None,
+) -> None:
     """Draw `track.png` for one vehicle or a team.
 
     Args:
@@ -30,6 +36,7 @@ def draw_run(path: Path, title: str, flights: list[tuple[FlightNotes, FlightScor
         title: title above the picture.
         flights: notes and scores, one per vehicle. Tracks of a team are drawn around the first vehicle's
             home.
+        overlay: draws more on the axes of the track from above, labelled for its legend.
     """
     figure = blank_figure(9.0, 11.6, dpi=130)
     scored = any(notes.commanded is not None for notes, _ in flights)
@@ -37,7 +44,7 @@ def draw_run(path: Path, title: str, flights: list[tuple[FlightNotes, FlightScor
     grid = figure.add_gridspec(len(ratios), 1, height_ratios=ratios)
     above, altitude, *rest = (figure.add_subplot(grid[k]) for k in range(len(ratios)))
     figure.suptitle(title, fontsize=13, fontweight="bold", color=INK)
-    _draw_from_above(above, flights)
+    _draw_from_above(above, flights, overlay)
     _draw_altitude(altitude, flights)
     for error in rest:  # there is a path to compare with
         error.sharex(altitude)  # the altitude always has times, even if the flight never reached its curve
@@ -67,7 +74,9 @@ def _offset(notes: FlightNotes, first: FlightNotes) -> tuple[float, float]:
     return north, east
 
 
-def _draw_from_above(axes: Any, flights: list[tuple[FlightNotes, FlightScore]]) -> None:
+def _draw_from_above(
+    axes: Any, flights: list[tuple[FlightNotes, FlightScore]], overlay: Callable[[Any], object] | None
+) -> None:
     first = flights[0][0]
     handles: list[Line2D] = []
     team = len(flights) > 1
@@ -113,9 +122,13 @@ def _draw_from_above(axes: Any, flights: list[tuple[FlightNotes, FlightScore]]) 
     axes.margins(0.06, 0.08)
     axes.set_xlabel("east of home, m", fontsize=9, color=INK)
     axes.set_ylabel("north of home, m", fontsize=9, color=INK)
+    if overlay is not None:
+        overlay(axes)
+    handles += axes.get_legend_handles_labels()[0]
     one_row = len(handles) < 8
+    above = 1.07 if one_row else 1.1 if len(handles) < 13 else 1.13  # of the axes: under the title
     axes.legend(
-        handles=handles, loc="upper center", bbox_to_anchor=(0.5, 1.07 if one_row else 1.1),
+        handles=handles, loc="upper center", bbox_to_anchor=(0.5, above),
         ncols=len(handles) if one_row else 4, fontsize=8, frameon=False, handlelength=1.6, columnspacing=1.2,
     )  # fmt: skip
     middle = axes.dataLim.get_points().mean(axis=0) if axes.dataLim.width >= 0.0 else np.zeros(2)

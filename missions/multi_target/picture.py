@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+from matplotlib.ticker import MaxNLocator
 
 from estimators.received import broken_at_gaps
 from estimators.reports.figure import INK, blank_figure, save_figure
@@ -40,6 +41,10 @@ def draw_search(path: Path, title: str, team: TargetSearchTeam, debriefing: Debr
     for k, moment in enumerate(_four(team)):
         axes = figure.add_subplot(grid[k // 2, 2 + k % 2])
         _draw_moment(axes, moment, team, score)
+        if k == 0:
+            axes.legend(fontsize=6, loc="upper right", framealpha=0.85)
+        if k >= 2:
+            axes.set_xlabel("east, m", fontsize=8, color=INK)
     _draw_found(figure.add_subplot(grid[2, :2]), team, score)
     _draw_metrics(figure.add_subplot(grid[2, 2:]), team, score)
     save_figure(figure, path)
@@ -121,7 +126,7 @@ def _draw_moment(axes: Any, moment: Moment, team: TargetSearchTeam, score: Searc
     north, east, mass = moment.points
     axes.set_facecolor("#f8fafc")
     if len(mass):
-        axes.scatter(east, north, c=mass, s=9.0, cmap="inferno_r", vmin=0.0, linewidths=0)
+        axes.scatter(east, north, c=mass, s=9.0, cmap="inferno_r", vmin=0.0, linewidths=0, label="belief")
     found = [t for t in team.watch.belief.found if t.time_us <= moment.time_us]
     axes.plot(
         [t.east_m for t in found],
@@ -130,9 +135,11 @@ def _draw_moment(axes: Any, moment: Moment, team: TargetSearchTeam, score: Searc
         color=_FOUND,
         markersize=4,
         fillstyle="none",
+        label="found",
     )
     if score is not None:
-        axes.plot(score.targets_ne_m[:, 1], score.targets_ne_m[:, 0], "+", color=_TRUE, markersize=4)
+        places = score.targets_ne_m
+        axes.plot(places[:, 1], places[:, 0], "+", color=_TRUE, markersize=4, label="target")
     for k, searcher in enumerate(team.searchers):
         before = [(n, e) for t, n, e in searcher.track if t <= moment.time_us]
         if before:
@@ -142,7 +149,7 @@ def _draw_moment(axes: Any, moment: Moment, team: TargetSearchTeam, score: Searc
     _limits(axes, team)
     since_s = (moment.time_us - team.search.began_us) * 1e-6
     axes.set_title(
-        f"intensity at {since_s:.0f} s: {float(np.sum(mass)):.1f} not found",
+        f"{since_s:.0f} s: {len(found)} found, {float(np.sum(mass)):.1f} expected in the belief",
         fontsize=9,
         color=INK,
         loc="left",
@@ -162,6 +169,7 @@ def _draw_found(axes: Any, team: TargetSearchTeam, score: SearchScore | None) ->
         axes.step(score.time_s, score.right, where="post", color=_COLOURS[0], linestyle="--", label="right")
         axes.axhline(len(score.targets_ne_m), color=_TRUE, linewidth=0.8, label="targets")
     _style(axes, "number of targets")
+    axes.yaxis.set_major_locator(MaxNLocator(integer=True))
 
 
 def _draw_metrics(axes: Any, team: TargetSearchTeam, score: SearchScore | None) -> None:
@@ -172,7 +180,7 @@ def _draw_metrics(axes: Any, team: TargetSearchTeam, score: SearchScore | None) 
         return
     left = [state.expected_undetected for state in team.search.states]
     axes.plot(_times(team), left, color=_COLOURS[0], label="expected undetected")
-    _style(axes, "number of targets")
+    _style(axes, "expected number of targets")
 
 
 def _style(axes: Any, label: str) -> None:

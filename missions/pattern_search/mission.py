@@ -1,6 +1,7 @@
 """The mission of one search pattern: its curve, its size for the vehicle, and its flight."""
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 from autopilot_bridge.mission_plan import MissionItem
@@ -17,6 +18,7 @@ from missions.pattern_search.flight import (
     pattern_outline,
 )
 from missions.pattern_search.for_vehicle import flight_for_vehicle
+from missions.pattern_search.picture import draw_search
 from missions.pattern_search.search_figures import search_figures
 from missions.pattern_search.tag_watch import TagWatch
 from missions.patterns import Curve
@@ -140,6 +142,9 @@ class PatternSearchFlight(MissionFlight[FlightOptions]):
             figures=figures,
             lines=lambda: _lines(figures),
             title=self._title(options),
+            overlay=partial(draw_search, debriefing, search_line(figures["search"]))
+            if options.search
+            else None,
         )
 
     def _unsearched(self, debriefing: Debriefing) -> str:

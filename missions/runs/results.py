@@ -49,7 +49,7 @@ def draw(path: Path, text: str, report: Report, debriefing: Debriefing) -> None:
         return
     from missions.flown.picture import draw_run  # Matplotlib
 
-    draw_run(path, text, list(debriefing.flights))
+    draw_run(path, text, list(debriefing.flights), report.overlay)
 
 
 def time_stamp_faults(flight: Flight) -> list[str]:

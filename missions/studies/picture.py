@@ -7,7 +7,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.reports.figure import INK, blank_figure, save_figure, tidy
+from estimators.reports.figure import INK, blank_figure, label_of, save_figure, tidy
 from flightsim.foundation.random_streams import RandomStreams
 from missions.studies.results import Results
 from missions.studies.statistics import median_interval, rate_of
@@ -43,7 +43,9 @@ def draw_study(results: Results, folder: Path) -> None:
     rows = -(-panels // columns)
     figure = blank_figure(1.0 + 5.0 * columns, 1.2 + 3.1 * rows)
     ended = f"{results.table.num_rows} trials" + ("" if results.complete else ", not complete")
-    figure.suptitle(f"{results.name}: {ended}", fontsize=12, fontweight="bold", color=INK)
+    about = f"\n{results.description}" if results.description else ""
+    marks = "dots: trials; marks: medians with 95 % intervals" if not sampled else "dots: trials"
+    figure.suptitle(f"{results.name}: {ended} ({marks}){about}", fontsize=11, fontweight="bold", color=INK)
     axes = [figure.add_subplot(rows, columns, k + 1) for k in range(panels)]
     if sampled:
         for k, axis in enumerate(axes):
@@ -88,7 +90,8 @@ def _draw_rates(axes: Any, results: Results) -> None:
             seen.add(group)
             _mark(axes, x, rate.rate, rate.ci95, group, name)
     axes.set_ylim(-0.03, 1.03)
-    _finish(axes, ticks, label, f"success: {results.success or 'has a row'}, Wilson 95 %")
+    of = label_of(results.success) if results.success else "with a result"
+    _finish(axes, ticks, label, f"share of trials: {of}\n(95 % intervals by Wilson)")
 
 
 def _draw_cells(axes: Any, results: Results, name: str, placed: Array) -> None:
@@ -105,7 +108,7 @@ def _draw_cells(axes: Any, results: Results, name: str, placed: Array) -> None:
             color=_COLOURS[group % len(_COLOURS)], markersize=3, alpha=0.35, markeredgewidth=0,
         )  # fmt: skip
         _mark(axes, x, float(np.median(known)), median_interval(known), group, None)
-    _finish(axes, ticks, label, name)
+    _finish(axes, ticks, label, label_of(name))
 
 
 def _mark(
@@ -127,15 +130,15 @@ def _draw_scatter(axes: Any, results: Results, parameter: str, name: str, placed
     for x in drawn[finished & ~succeeded]:
         axes.axvline(x, ymax=0.04, color=_COLOURS[1], linewidth=1.2)
     tidy(axes)
-    axes.set_xlabel(f"{parameter} (below: trials without success)", fontsize=9, color=INK)
-    axes.set_ylabel(name or "success", fontsize=9, color=INK)
+    axes.set_xlabel(f"{label_of(parameter)} (below: trials without success)", fontsize=9, color=INK)
+    axes.set_ylabel(label_of(name) if name else "success", fontsize=9, color=INK)
 
 
 def _finish(axes: Any, ticks: Sequence[str], label: str, title: str) -> None:
     tidy(axes)
     axes.set_xticks(range(len(ticks)), ticks)
     axes.set_xlim(-0.6, len(ticks) - 0.4)
-    axes.set_xlabel(label, fontsize=9, color=INK)
+    axes.set_xlabel(label_of(label), fontsize=9, color=INK)
     axes.set_ylabel(title, fontsize=9, color=INK)
 
 

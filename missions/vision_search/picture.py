@@ -22,6 +22,7 @@ __all__ = ["draw_search"]
 _COLOURS: Final = ("#1769aa", "#c2410c", "#15803d", "#7c3aed", "#b91c1c", "#0e7490")
 _GRID: Final = "#e5e7eb"
 _TRUE: Final = "#dc2626"
+_BLACK: Final = 6.0  # times the probability of a cell of a uniform belief
 _WIDTHS: Final = 6.0  # half the side of the ellipses' view, in standard deviations
 
 
@@ -38,25 +39,39 @@ def draw_search(path: Path, title: str, team: VisionSearchTeam, debriefing: Debr
     figure = blank_figure(14.0, 7.2)
     figure.suptitle(title, fontsize=12, fontweight="bold", color=INK)
     grid = figure.add_gridspec(2, 4, height_ratios=(3.4, 2.8))
-    for k, moment in enumerate(_four(team)):
-        _draw_moment(figure.add_subplot(grid[0, k]), moment, team, place)
+    moments = _moments(team)
+    above = grid[0, :].subgridspec(1, len(moments))
+    for k, moment in enumerate(moments):
+        axes = figure.add_subplot(above[0, k])
+        _draw_moment(axes, moment, team, place)
+        axes.set_xlabel("east of home, m", fontsize=8, color=INK)
+        if k == 0:
+            axes.set_ylabel("north of home, m\n(shade: where the target may be)", fontsize=8, color=INK)
     _draw_detection(figure.add_subplot(grid[1, 0]), team)
     _draw_covariance(figure.add_subplot(grid[1, 1:3]), team, place)
     _draw_ellipses(figure.add_subplot(grid[1, 3]), team, place)
     save_figure(figure, path)
 
 
-def _four(team: VisionSearchTeam) -> list[Moment]:
-    """Two moments of the search, the first after the target was localized, and the last."""
+def _moments(team: VisionSearchTeam) -> list[Moment]:
+    """Up to four different moments: two of the search, the first after the target was localized, and the
+    last.
+    """
     search = team.search
     moments, end_us = search.moments, search.localized_us
     flown = [m for m in moments if m.time_us >= search.began_us] or moments
     if end_us < 0:
-        return [flown[min(len(flown) - 1, k * len(flown) // 3)] for k in range(4)]
+        return _different([flown[min(len(flown) - 1, k * len(flown) // 3)] for k in range(4)])
     start_us = flown[0].time_us
     wanted = [start_us + share * (end_us - start_us) for share in (0.4, 0.85)]
     after = [m for m in flown if m.time_us >= end_us] or [flown[-1]]
-    return [*(min(flown, key=lambda m: abs(m.time_us - t)) for t in wanted), after[0], flown[-1]]
+    searched = (min(flown, key=lambda m: abs(m.time_us - t)) for t in wanted)
+    return _different([*searched, after[0], flown[-1]])
+
+
+def _different(moments: list[Moment]) -> list[Moment]:
+    """The moments of different times, in order: a target that is found at once leaves few."""
+    return list({moment.time_us: moment for moment in moments}.values())
 
 
 def _times(states: list[AreaEstimate], began_us: int) -> list[float]:
@@ -67,7 +82,8 @@ def _draw_moment(
     axes: Any, moment: Moment, team: VisionSearchTeam, place: tuple[float, float] | None
 ) -> None:
     layout, search = team.search.layout, team.search
-    density = moment.shares / max(moment.shares.max(), 1e-300)
+    # a uniform belief is grey: black is a place that is much more probable than others
+    density = moment.shares / max(moment.shares.max(), _BLACK / moment.shares.size)
     axes.imshow(
         np.sqrt(density),  # small probabilities are visible too
         origin="lower",
@@ -155,7 +171,7 @@ def _draw_covariance(axes: Any, team: VisionSearchTeam, place: tuple[float, floa
         if place is not None:
             errors = [max(1e-3, math.dist(place, (s.north_m, s.east_m))) for s in states]
             axes.semilogy(times, errors, color=colour, linestyle=":", label=f"error, vehicle {k + 1}")
-    _style(axes, "longest sigma and error, m")
+    _style(axes, "standard deviation (longest axis)\nand error of the target's place, m")
 
 
 def _draw_ellipses(axes: Any, team: VisionSearchTeam, place: tuple[float, float] | None) -> None:
@@ -172,7 +188,9 @@ def _draw_ellipses(axes: Any, team: VisionSearchTeam, place: tuple[float, float]
         axes.set_ylim(last[0].north_m - half_m, last[0].north_m + half_m)
     axes.set_aspect("equal")
     axes.tick_params(labelsize=7, colors=INK)
-    axes.set_title("95 % ellipses at the end, m", fontsize=9, color=INK, loc="left")
+    axes.set_xlabel("east of home, m", fontsize=8, color=INK)
+    axes.set_ylabel("north of home, m", fontsize=8, color=INK)
+    axes.set_title("95 % ellipses at the end", fontsize=9, color=INK, loc="left")
 
 
 def _style(axes: Any, label: str) -> None:
