@@ -1,29 +1,25 @@
 """Libraries of the extras of the package, which most runs do without."""
 
-import importlib
 from pathlib import Path
 from typing import Any
 
 from estimators.errors import EstimatorError
+from flightsim.foundation.packages import MissingPackage, required
 
 __all__ = ["library"]
 
 
-def library(name: str, path: Path, extra: str = "maps") -> Any:
+def library(name: str, path: Path) -> Any:
     """A library of an extra.
 
     Args:
         name: of the module.
         path: the file that needs it.
-        extra: the extra that installs it.
 
     Raises:
         EstimatorError: it is not installed.
     """
     try:
-        return importlib.import_module(name)
-    except ImportError:
-        module = name.partition(".")[0]
-        raise EstimatorError(
-            f"{path} needs {module}, which is not installed: pip install 'flightstack[{extra}]'"
-        ) from None
+        return required(name, str(path))
+    except MissingPackage as error:
+        raise EstimatorError(str(error)) from None

@@ -6,7 +6,6 @@ from dataclasses import replace
 from operator import call
 from typing import Any, Final
 
-import jsbsim
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,6 +13,7 @@ from flightsim.airframe import ActuatorChannel, Airframe, AirframeError, Airfram
 from flightsim.foundation.kernels import bound, kernel
 from flightsim.interface import AILERON, BRAKE, ELEVATOR, MAX_ACTUATORS, RUDDER, THROTTLE
 from flightsim.jsbsim_model import find_property
+from flightsim.jsbsim_package import jsbsim
 
 Array = NDArray[np.float64]
 

@@ -4,8 +4,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
-import jsbsim
-
 from flightsim import truth as t
 from flightsim.airframe_channels import read_channels, standard_channel
 from flightsim.airframe_types import (
@@ -21,6 +19,7 @@ from flightsim.airframe_types import (
 from flightsim.foundation.conversion import Conversion, NotMade, Refused
 from flightsim.foundation.documents import excerpt, read_toml
 from flightsim.foundation.file_content import FileError
+from flightsim.jsbsim_package import jsbsim
 from flightsim.toml_tables import listed, names_of, number, only, table_of, text
 
 _MODELS_DIR: Final = Path(__file__).parent / "models"

@@ -10,7 +10,6 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
-import jsbsim
 import numpy as np
 
 from flightsim.airframe import Airframe, AirframeError, FlightLimits, Role, load_airframe
@@ -19,6 +18,7 @@ from flightsim.environment import Environment
 from flightsim.flight_figures import FlightEnvelope
 from flightsim.foundation.atmosphere import GRAVITY_M_S2, SEA_LEVEL_DENSITY_KG_M3
 from flightsim.home import Home
+from flightsim.jsbsim_package import jsbsim
 from flightsim.linear_modes import LinearModel, P, Q, R, U, V, W, linearise
 from flightsim.model_files import content_digest
 from flightsim.trim_flight import AIRSPEEDS_M_S, FlightTrim, TrimError, trim_in_tunnel

@@ -4,8 +4,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-import jsbsim
-
 from flightsim import truth as t
 from flightsim.airframe import Airframe, AirframeError, AirframeKind, load_airframe
 from flightsim.environment import Environment
@@ -13,6 +11,7 @@ from flightsim.foundation.imperial import KG_M2_PER_SLUG_FT2, KG_PER_SLUG, M_PER
 from flightsim.home import Home
 from flightsim.initial_state import InitialState, initialise
 from flightsim.jsbsim_model import find_property, hold_motion, load_fdm
+from flightsim.jsbsim_package import jsbsim
 
 _RATE_HZ: Final = 250
 _HEIGHT_M: Final = 100.0  # clear of ground effect

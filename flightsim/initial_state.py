@@ -5,13 +5,12 @@ from dataclasses import dataclass, replace
 from typing import Final
 from xml.etree import ElementTree
 
-import jsbsim
-
 from flightsim import truth as t
 from flightsim.airframe import Airframe, AirframeError, AirframeKind, LaunchKind, LaunchParameters
 from flightsim.environment import Environment
 from flightsim.foundation.imperial import M_PER_FT
 from flightsim.home import Home
+from flightsim.jsbsim_package import jsbsim
 
 _INCH: Final = 0.0254
 _UNITS_M: Final = {"IN": _INCH, "FT": M_PER_FT, "M": 1.0}

@@ -8,9 +8,8 @@ from threading import get_ident
 from typing import Any, Final
 from xml.etree import ElementTree
 
-import jsbsim
-
 from flightsim.airframe import Airframe, AirframeError, AirframeKind
+from flightsim.jsbsim_package import jsbsim
 from flightsim.model_files import refusal, write_copy
 
 _LOG: Final = logging.getLogger("flightsim.jsbsim")

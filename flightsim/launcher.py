@@ -9,7 +9,6 @@ on the rail. So the motion is continuous, and an accelerometer measures the same
 import math
 from typing import Any, Final
 
-import jsbsim
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,6 +16,7 @@ from flightsim.airframe import AirframeError, LaunchKind, LaunchParameters
 from flightsim.foundation.imperial import KG_M2_PER_SLUG_FT2, KG_PER_SLUG, M_PER_FT, N_PER_LBF, NM_PER_LBF_FT
 from flightsim.foundation.rotations import quaternion_from_euler, rotate_inverse
 from flightsim.jsbsim_model import LAUNCHER_FORCE, LAUNCHER_MOMENT, find_property
+from flightsim.jsbsim_package import jsbsim
 from flightsim.truth_reading import MOTION
 
 Array = NDArray[np.float64]

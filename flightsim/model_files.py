@@ -12,11 +12,10 @@ from pathlib import Path
 from typing import Final
 from xml.etree import ElementTree
 
-import jsbsim
-
 from flightsim.airframe import Airframe, AirframeError
 from flightsim.foundation.documents import read_xml
 from flightsim.foundation.file_content import FileError
+from flightsim.jsbsim_package import jsbsim
 
 _ENGINES: Final = frozenset({"engine", "thruster"})
 _SYSTEMS: Final = frozenset({"system", "autopilot", "flight_control"})

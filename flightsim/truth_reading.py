@@ -7,7 +7,6 @@ from operator import call
 from struct import Struct
 from typing import Final
 
-import jsbsim
 import numpy as np
 from numpy.typing import NDArray
 
@@ -19,6 +18,7 @@ from flightsim.foundation.imperial import KG_M3_PER_SLUG_FT3, M_PER_FT, PA_PER_P
 from flightsim.foundation.kernels import bound, kernel
 from flightsim.foundation.rotations import quaternion_from_euler
 from flightsim.jsbsim_model import find_property
+from flightsim.jsbsim_package import jsbsim
 
 Array = NDArray[np.float64]
 

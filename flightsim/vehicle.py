@@ -4,7 +4,6 @@ import math
 from pathlib import Path
 from typing import Any, Final
 
-import jsbsim
 import numpy as np
 from numpy.typing import NDArray
 
@@ -26,6 +25,7 @@ from flightsim.home import Home
 from flightsim.initial_state import InitialState, initialise, set_battery
 from flightsim.interface import MAX_ACTUATORS
 from flightsim.jsbsim_model import find_property, hold_motion, load_fdm
+from flightsim.jsbsim_package import jsbsim
 from flightsim.launcher import Launcher
 from flightsim.truth_reading import Motion, TruthReader
 from flightsim.vehicle_air import VehicleAir

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from operator import call
 from typing import Any, Final
 
-import jsbsim
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,6 +14,7 @@ from flightsim.environment import CosineGust, Environment
 from flightsim.foundation.imperial import M_PER_FT
 from flightsim.foundation.kernels import bound, kernel
 from flightsim.jsbsim_model import ROTARY_GUSTS, find_property
+from flightsim.jsbsim_package import jsbsim
 from flightsim.rotary_gusts import RotaryGusts, advance_rotary
 from flightsim.turbulence import BLOCK_STEPS, DrydenTurbulence, advance_turbulence
 from flightsim.wind_profile import WindLaw, WindProfile, wind_factor

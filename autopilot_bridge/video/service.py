@@ -19,6 +19,7 @@ from autopilot_bridge.video.messages import (
     view_to_json,
 )
 from autopilot_bridge.video.parameters import VideoError, VideoParameters
+from flightsim.foundation.packages import required
 from flightsim.payload import CameraView, ImagerParameters, PinholeModel
 from flightsim.picture import Scenery
 
@@ -82,6 +83,7 @@ class VideoService:
         parameters: VideoParameters,
         on_loss: Callable[[str], None],
     ) -> None:
+        required("av", "video")
         self._on_loss = on_loss
         self._cameras = tuple(cameras)
         self._parameters = parameters

@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 
 __all__ = ["MAP_FORMATS", "export_map"]
 
-_EXTRA: Final = "geo"
 _LAST_UNIX_US: Final = 253_402_300_799_000_000  # the end of the year 9999, which dates have
 _NAMESPACES: Final = {"": "http://www.opengis.net/kml/2.2", "gx": "http://www.google.com/kml/ext/2.2"}
 _COLOURS: Final = {  # aabbggrr
@@ -67,7 +66,7 @@ def _time(unix_us: int) -> datetime | None:
 
 
 def _kml(places: Sequence[MapFeature], path: Path) -> bytes:
-    simplekml = library("simplekml", path, _EXTRA)
+    simplekml = library("simplekml", path)
     kml = simplekml.Kml()
     for place in places:
         made = _KML[place.kind](kml, place, simplekml)
@@ -135,7 +134,7 @@ _KML: Final[Mapping[FeatureKind, Callable[[Any, MapFeature, Any], Any]]] = {
 
 def _gpx(places: Sequence[MapFeature], path: Path) -> bytes:
     """Tracks, lines as routes, points as waypoints. GPX has no areas."""
-    gpx = library("gpxpy.gpx", path, _EXTRA)
+    gpx = library("gpxpy.gpx", path)
     made = gpx.GPX()
     made.creator = "flightstack"
     for place in places:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimators.logs.table import Table
+from flightsim.foundation.packages import required
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -84,7 +85,7 @@ def arrow_table(table: Table, *, si: bool) -> "pa.Table":
         table: messages of one component.
         si: SI units and radians in place of wire values.
     """
-    import pyarrow as pa
+    pa = required("pyarrow", "an Arrow table")
 
     arrays: list[Any] = []
     fields = []
@@ -109,6 +110,6 @@ def arrow_table(table: Table, *, si: bool) -> "pa.Table":
 
 def arrow_of_columns(parts: Sequence[Mapping[str, NDArray[Any]]]) -> "pa.Table":
     """Parts with the same columns, one below the other, as an Arrow table."""
-    import pyarrow as pa
+    pa = required("pyarrow", "an Arrow table")
 
     return pa.concat_tables([pa.table(dict(part)) for part in parts])

@@ -16,6 +16,7 @@ from estimators.logs.table import Table
 from estimators.logs.units import to_si
 from estimators.messages import SOURCE_FIELDS
 from estimators.user_choices import ExportFormat
+from flightsim.foundation.packages import required
 
 FORMATS: Final = tuple(
     map(str, (ExportFormat.CSV, ExportFormat.PARQUET, ExportFormat.NPZ, ExportFormat.MCAP))
@@ -88,8 +89,7 @@ def _new_folder(path: Path) -> None:
 
 
 def _parquet(log: Log, selections: Sequence[Selection], path: Path, si: bool) -> list[Path]:
-    from pyarrow import parquet
-
+    parquet = required("pyarrow.parquet", "a Parquet file")
     _new_folder(path)
     written = []
     for table in _tables(log, selections):
@@ -101,9 +101,7 @@ def _parquet(log: Log, selections: Sequence[Selection], path: Path, si: bool) ->
 
 
 def _csv(log: Log, selections: Sequence[Selection], path: Path, si: bool) -> list[Path]:
-    import pyarrow as pa
-    from pyarrow import csv
-
+    pa, csv = required("pyarrow", "a CSV file"), required("pyarrow.csv")
     _new_folder(path)
     written = []
     for table in _tables(log, selections):
@@ -126,10 +124,9 @@ def _npz(log: Log, selections: Sequence[Selection], path: Path, si: bool) -> lis
 
 
 def _mcap(log: Log, selections: Sequence[Selection], path: Path, si: bool) -> list[Path]:
-    from mcap.writer import Writer
-
+    writer_module = required("mcap.writer", "an MCAP file")
     with new_file(path) as part, open(part, "wb") as file:
-        writer = Writer(file)
+        writer = writer_module.Writer(file)
         writer.start(profile="", library="flightstack")
         write_mcap_messages(writer, log, selections, si=si)
         writer.finish()

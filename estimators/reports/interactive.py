@@ -21,7 +21,6 @@ __all__ = ["Plots", "interactive_plots", "script_tag"]
 
 Array = NDArray[np.float64]
 
-_EXTRA: Final = "report"
 _MOST_POINTS: Final = 1500  # of a line: more than a screen has
 _MOST_SET: Final = 500  # of the points of a belief
 _MOMENTS: Final = 4
@@ -52,7 +51,7 @@ def script_tag(path: Path) -> str:
     Raises:
         EstimatorError: Bokeh is not installed.
     """
-    resources = library("bokeh.resources", path, _EXTRA)
+    resources = library("bokeh.resources", path)
     text: str = resources.Resources(mode="inline", components=["bokeh"]).render_js()
     return text
 
@@ -67,8 +66,8 @@ def interactive_plots(path: Path, scenes: Mapping[str, Scene]) -> Plots:
     Raises:
         EstimatorError: Bokeh is not installed.
     """
-    plotting = library("bokeh.plotting", path, _EXTRA)
-    library("bokeh.models", path, _EXTRA)
+    plotting = library("bokeh.plotting", path)
+    library("bokeh.models", path)
     made: list[tuple[str, Any]] = [("Track from above", _from_above(plotting, scenes))]
     series = _series(scenes)
     shared: Any = None
@@ -78,9 +77,7 @@ def interactive_plots(path: Path, scenes: Mapping[str, Scene]) -> Plots:
         made.append((title, plot))
     for name, scene in scenes.items():
         made += [(title, plot) for title, plot in _moments(plotting, name if len(scenes) > 1 else "", scene)]
-    script, divs = library("bokeh.embed", path, _EXTRA).components(
-        tuple(plot for _, plot in made), wrap_script=True
-    )
+    script, divs = library("bokeh.embed", path).components(tuple(plot for _, plot in made), wrap_script=True)
     return Plots(script=script, parts=[(title, div) for (title, _), div in zip(made, divs, strict=True)])
 
 
@@ -243,7 +240,7 @@ def _moments(plotting: Any, name: str, scene: Scene) -> list[tuple[str, Any]]:
 
 
 def _source(data: Mapping[str, Any]) -> Any:
-    return library("bokeh.models", Path("report.html"), _EXTRA).ColumnDataSource(data=dict(data))
+    return library("bokeh.models", Path("report.html")).ColumnDataSource(data=dict(data))
 
 
 def _small(values: Array) -> NDArray[np.float32]:

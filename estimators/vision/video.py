@@ -10,12 +10,12 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Final
 
-import av
 import numpy as np
 from numpy.typing import NDArray
 
 from estimators.errors import VideoError
 from flightsim.foundation.file_content import FileError, open_file
+from flightsim.foundation.packages import required
 
 __all__ = ["Film", "TimedPicture", "frames_of", "is_stream"]
 
@@ -69,7 +69,9 @@ def frames_of(
         VideoError: it can't be opened or decoded, or has no pictures; a stream was silent for so long; its
             frames have no times and no rate is given, or they have times and a rate is given. The end of a
             file, or of a stream by its server, ends the iteration.
+        MissingPackage: PyAV is not installed.
     """
+    av = required("av", f"the video {source}")
     if not is_stream(source):
         try:
             open_file(source).close()  # FFmpeg waits for a pipe, and says less of what is no video
@@ -120,15 +122,17 @@ class Film:
 
     Raises:
         VideoError: the file exists, or can't be created.
+        MissingPackage: PyAV is not installed.
     """
 
     def __init__(self, path: Path, *, width_px: int, height_px: int) -> None:
         self._path = path
+        self._av = required("av", f"the video {path}")
         try:
             self._file = path.open("xb")
         except OSError as error:
             raise VideoError(f"can't create the video {path}: {error.strerror}") from error
-        self._container: Any = av.open(self._file, "w", format="mp4")
+        self._container: Any = self._av.open(self._file, "w", format="mp4")
         stream = self._container.add_stream("libx264rgb", rate=30)
         stream.width, stream.height, stream.pix_fmt = width_px, height_px, "bgr24"
         stream.codec_context.time_base = _MICROSECOND
@@ -142,7 +146,7 @@ class Film:
         Raises:
             VideoError: the file can't be written.
         """
-        frame = av.VideoFrame.from_ndarray(picture, format="bgr24")
+        frame = self._av.VideoFrame.from_ndarray(picture, format="bgr24")
         frame.pts, frame.time_base = time_us, _MICROSECOND
         with self._reporting():
             for packet in self._stream.encode(frame):
@@ -166,7 +170,7 @@ class Film:
     def _reporting(self) -> Iterator[None]:
         try:
             yield
-        except (av.error.FFmpegError, OSError) as error:
+        except (self._av.error.FFmpegError, OSError) as error:
             raise VideoError(
                 f"can't write the video {self._path}: {error.strerror}; check the disk"
             ) from error

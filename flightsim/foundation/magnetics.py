@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pygeomag import GeoMag
 
+from flightsim.foundation.packages import MissingPackage, required
+
 _GAUSS_PER_NANOTESLA = 1e-5
 
 
@@ -74,11 +76,9 @@ def main_field_ned_gauss(
     if not 1900.0 <= decimal_year <= 2030.0:
         raise ValueError(f"decimal year {decimal_year} is outside the IGRF's validity, 1900.0 to 2030.0")
     try:
-        import ppigrf
-    except ImportError:
-        raise ValueError(
-            "the IGRF needs ppigrf, which is not installed: pip install 'flightstack[maps]'"
-        ) from None
+        ppigrf = required("ppigrf", "the IGRF")
+    except MissingPackage as error:
+        raise ValueError(str(error)) from None
     year = int(decimal_year)
     start = datetime(year, 1, 1)
     length = datetime(year + 1, 1, 1) - start

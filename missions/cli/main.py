@@ -15,6 +15,7 @@ from typing import Final
 
 import click
 
+from flightsim.foundation.packages import MissingPackage, missing
 from missions.cli.exit_codes import DONE, FAILED, INTERRUPTED, USAGE
 from missions.cli.options import report
 from missions.process.supervision import supervised
@@ -111,6 +112,12 @@ def run_command_line(arguments: list[str] | None = None) -> int:
     except KeyboardInterrupt:
         click.echo("interrupted", err=True)
         return INTERRUPTED
+    except ModuleNotFoundError as error:
+        text = str(error) if isinstance(error, MissingPackage) else missing(error.name)
+        if not text:
+            raise
+        report(text)
+        return FAILED
     except OSError as error:
         text = str(error)
         if error.filename is None and error.errno in _NOT_WRITTEN:

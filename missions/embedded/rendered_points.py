@@ -11,6 +11,7 @@ from autopilot_bridge.mavlink import Packet, definition
 from estimators.handoff.motion_watch import MotionWatch, MotionWatchParameters
 from estimators.messages import read_message
 from estimators.vision import CameraDescription, CameraGeometry
+from flightsim.foundation.packages import required
 from flightsim.payload import CameraParameters, CameraView, ImagerParameters, PinholeModel, Terrain
 from flightsim.picture import Renderer, Scenery
 from missions.embedded.picture_geometry import picture_geometry
@@ -86,6 +87,7 @@ class RenderedPointsReader:
         )
         self.watch = MotionWatch(CameraDescription(geometry=parameters.geometry), parameters.front_end)
         self.film: FrameWriter | None = None
+        required("av", "a handoff from pixels, of which a clip is kept,")
         self._kept: deque[CameraPicture] = deque(maxlen=_KEPT)
 
     @property

@@ -8,6 +8,7 @@ from pathlib import Path
 from estimators.errors import VideoError
 from estimators.vision import CameraDescription
 from estimators.vision.video import Film, Picture
+from flightsim.foundation.packages import required
 
 __all__ = ["CameraFilm"]
 
@@ -18,9 +19,13 @@ class CameraFilm:
     Args:
         path: of the video; the camera's description gets the suffix .toml.
         camera: its description; `start_us` is that of the first picture.
+
+    Raises:
+        MissingPackage: PyAV is not installed.
     """
 
     def __init__(self, path: Path, camera: CameraDescription) -> None:
+        required("av", f"the video {path}")  # before the flight, not at its first picture
         self._path, self._camera = path, camera
         self._film: Film | None = None
         self._start_us = 0

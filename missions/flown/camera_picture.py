@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from io import BytesIO
 from typing import TYPE_CHECKING, Any, Final
 
+from flightsim.foundation.packages import required
 from flightsim.foundation.vectors import ImagePoint
 
 if TYPE_CHECKING:
@@ -92,8 +93,7 @@ def png(pixels: "NDArray[np.uint8]") -> bytes:
 
 def clip(pictures: "Iterable[NDArray[np.uint8]]", rate_hz: int) -> bytes:
     """Pictures (height, width, 3), BGR, of one size as a video (MP4, H.264); b"" without pictures."""
-    import av
-
+    av = required("av", "a clip of the tracks")
     file, stream = BytesIO(), None
     with av.open(file, "w", format="mp4") as container:
         for pixels in pictures:

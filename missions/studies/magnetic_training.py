@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimators.magnetic_identification.classifier import FEATURES
+from flightsim.foundation.packages import MissingPackage, required
 from missions.errors import MissionError, PlanError
 
 Array = NDArray[np.float64]
@@ -23,11 +24,9 @@ def require_training() -> None:
         PlanError: scikit-learn is not installed.
     """
     try:
-        import sklearn  # noqa: F401
-    except ImportError:
-        raise PlanError(
-            "`train` needs scikit-learn, which is not installed: pip install 'flightstack[learn]'"
-        ) from None
+        required("sklearn", "`train`")
+    except MissingPackage as error:
+        raise PlanError(str(error)) from None
 
 
 def fitted_tables(features: Array, is_target: NDArray[np.bool_]) -> dict[str, dict[str, Any]]:

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from autopilot_bridge.clock.pacing import wall_time_s
+from flightsim.foundation.packages import missing
 from missions.errors import MissionError, PlanError
 from missions.studies.crew import Broken, Crew, Died, Event, Ready, Worker, supervise
 from missions.studies.job import Job, PackedJob
@@ -60,7 +61,7 @@ class RayCluster:
 
     def __init__(self, address: str = LOCAL, *, workers: int | None = None) -> None:
         if ray is None:
-            raise PlanError("Ray is not installed: pip install 'flightstack[ray]'")
+            raise PlanError(missing("ray", "a study on a cluster"))
         if workers is not None and workers < 1:
             raise PlanError(f"`workers` {workers} is not possible; 1 or more are")
         self.address, self._most = address, workers

@@ -154,7 +154,7 @@ def key(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[str, ...]:
     path = tmp_path / "key"
     path.write_text("pass phrase\n")
     seconds = count(1_000_000)
-    monkeypatch.setattr("missions.cli.bodies.signing.now", lambda: next(seconds) * 100_000)
+    monkeypatch.setattr("missions.cli.bodies.sitl_signing.now", lambda: next(seconds) * 100_000)
     return "--signing-key", str(path), "--duration", "2"
 
 

@@ -26,7 +26,7 @@ from missions.base.given_text import parameters_from_file
 from missions.base.mission import WorldDefaults
 from missions.base.run_options import ServedWorldOptions
 from missions.cli.bodies.params import known_to_all
-from missions.cli.bodies.signing import signed_how, vehicle_signing, warn_if_unsigned
+from missions.cli.bodies.sitl_signing import signed_how, vehicle_signing, warn_if_unsigned
 from missions.cli.bodies.status_line import StatusLine, announce_compiling
 from missions.cli.bodies.storage import Losses, VehicleCards
 from missions.cli.bodies.video import start_video

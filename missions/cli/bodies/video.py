@@ -9,6 +9,7 @@ import click
 from autopilot_bridge.sitl import Sitl
 from autopilot_bridge.video import VideoParameters, VideoService
 from autopilot_bridge.video.for_sitl import show_cameras
+from flightsim.foundation.packages import installed, missing
 
 
 def start_video(
@@ -35,6 +36,9 @@ def start_video(
         if video is not None or pictures is not None:
             raise ValueError("video and pictures are not possible on Windows; accepted: --video off")
         click.echo("no video: it is not possible on Windows", err=True)
+        return None
+    if video is None and pictures is None and not installed("av"):
+        click.echo(missing("av", "no video: it"), err=True)
         return None
 
     if video == "off":
