@@ -1,11 +1,11 @@
 """What a viewer costs a flight: an embedded Lissajous flight with and without one, in turns.
 
-    python -m benchmarks.view_cost [--rounds 5]
+    python -m benchmarks.view_cost [--rounds 5] [--mcap]
 
-Each round flies `lissajous --seed 2` in this process three times, as the command line does with its picture:
-without a viewer, with `--view FILE.rrd`, and with `--view FILE.mcap`. Processor time of this process counts,
-and the fastest of the rounds, since what else the machine does can only slow one. Compiled code and imports
-are warmed up before. Exit code 1 if `FILE.rrd` slows the flight by more than its bound.
+Each round flies `lissajous --seed 2` in this process, as the command line does, with its picture: without a
+viewer, with `--view FILE.rrd`, and, on request, with `--view FILE.mcap`. Processor time of this process
+counts, and the fastest of the rounds, since what else the machine does can only slow one. Compiled code and
+imports are warmed up before. Exit code 1 if `FILE.rrd` slows the flight by more than its bound.
 """
 
 import argparse
@@ -24,7 +24,6 @@ from missions.view.target import parse_view
 
 SEED: Final = 2
 MOST_SLOWER: Final = 0.25
-VIEWS: Final = (None, "rrd", "mcap")
 
 
 def flown_s(view: str | None, folder: Path) -> float:
@@ -48,11 +47,13 @@ def _write(line: str) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--mcap", action="store_true", help="FILE.mcap, too, with the raw messages as JSON")
     arguments = parser.parse_args()
+    views = (None, "rrd", "mcap") if arguments.mcap else (None, "rrd")
     gc.set_threshold(YOUNG_OBJECTS)
-    spent: dict[str | None, list[float]] = {view: [] for view in VIEWS}
+    spent: dict[str | None, list[float]] = {view: [] for view in views}
     for number in range(arguments.rounds + 1):
-        for view in VIEWS:
+        for view in views:
             with tempfile.TemporaryDirectory() as folder:
                 seconds = flown_s(view, Path(folder))
             if number:  # the first round warms up

@@ -12,7 +12,7 @@ from autopilot_bridge.sitl.backend import (
 from autopilot_bridge.sitl.containment import VehicleFailure
 from autopilot_bridge.sitl.server import PaceReport, SitlServer
 from autopilot_bridge.sitl.signing import SigningParameters, SigningStore, UnsignedFrom
-from autopilot_bridge.sitl.sitl import Sitl
+from autopilot_bridge.sitl.sitl import PacketLog, Sitl
 from autopilot_bridge.sitl.vehicle import SitlVehicle
 from autopilot_bridge.sitl.warm_up import compile_flight_code
 
@@ -23,6 +23,7 @@ __all__ = [
     "BackendSetup",
     "EmulatedBackend",
     "PaceReport",
+    "PacketLog",
     "Port",
     "SigningParameters",
     "SigningStore",

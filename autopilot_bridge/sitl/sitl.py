@@ -5,7 +5,7 @@ received on links are passed to the autopilots.
 """
 
 from collections.abc import Callable, Sequence
-from typing import Final
+from typing import Final, Protocol
 
 from autopilot_bridge.errors import TlogError
 from autopilot_bridge.links import Link, MemoryLink, Reach, memory_pair
@@ -17,7 +17,6 @@ from autopilot_bridge.sitl.signing import SigningParameters
 from autopilot_bridge.sitl.truth import TRUTH_RATE_HZ, TargetTruthEncoder
 from autopilot_bridge.sitl.vehicle import SitlVehicle
 from autopilot_bridge.storage.memory import MemoryCard
-from autopilot_bridge.tlog import TlogWriter
 from flightsim.payload import GroundTargets, MagneticMap, MagneticSpec, TerrainSpec, magnetic_field_of
 from flightsim.world import World, WorldParameters
 from flightsim.world_spec import WorldSpec
@@ -26,6 +25,14 @@ TruthListener = Callable[[int, bytes], None]
 """Called with vehicle time (microseconds) and a truth frame."""
 
 _NOT_SIGNED: Final = SigningParameters()
+
+
+class PacketLog(Protocol):
+    """What receives the messages of vehicles: a `TlogWriter`, or a viewer's feed."""
+
+    def write(self, time_us: int, packet: bytes) -> object:
+        """Take frames that were sent together at a Unix time."""
+        ...
 
 
 class Sitl:
@@ -201,7 +208,7 @@ class Sitl:
         ours.on_receive = lambda data: vehicle.take(channel, channel.parse(data))
         return theirs
 
-    def record(self, log: TlogWriter, on_failure: Callable[[str], None] | None = None) -> list[MemoryLink]:
+    def record(self, log: PacketLog, on_failure: Callable[[str], None] | None = None) -> list[MemoryLink]:
         """Log every vehicle's messages on a separate link, and the truth, stamped with the vehicles' clock.
 
         Args:

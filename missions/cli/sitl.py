@@ -11,6 +11,7 @@ from missions.cli.declared_options import declared_options
 from missions.cli.later import body_in
 from missions.cli.options import FIRMWARE_HELP, STRICT_HELP, WORLD_HELP
 from missions.cli.signing import key_option
+from missions.cli.view_option import view_option
 
 _BODIES: Final = "missions.cli.bodies.sitl"
 
@@ -73,6 +74,7 @@ _DECLARED: Final = (*declared_options(ServedWorldOptions), *declared_options(Vid
 @click.option("--params", type=click.Path(dir_okay=False), help="Parameter file (.params or .parm).")
 @click.option("--strict-params", is_flag=True, help=STRICT_HELP)
 @click.option("--log", metavar="FILE", help="New .tlog for what the vehicles say, and the truth.")
+@view_option()
 @click.option(
     "--firmware-logs",
     type=click.Path(path_type=Path, file_okay=False, exists=True),

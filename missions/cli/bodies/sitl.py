@@ -14,10 +14,10 @@ from autopilot_bridge.errors import BridgeError, TlogError
 from autopilot_bridge.firmware.simulator import simulator_defaults
 from autopilot_bridge.firmware_process import firmware_backend
 from autopilot_bridge.links import parse_address
-from autopilot_bridge.mavlink import FrameEncoder, dialect
+from autopilot_bridge.mavlink import FrameEncoder, FrameParser, Packet, dialect
 from autopilot_bridge.mavlink.components import GROUND_STATION
 from autopilot_bridge.parameter_files import left_out
-from autopilot_bridge.sitl import PaceReport, Port, Sitl, SitlServer, compile_flight_code, emulated
+from autopilot_bridge.sitl import PaceReport, PacketLog, Port, Sitl, SitlServer, compile_flight_code, emulated
 from autopilot_bridge.tlog import TlogWriter
 from autopilot_bridge.video import VideoParameters
 from flightsim.payload import MagneticSpec, magnetic_field_of
@@ -34,7 +34,12 @@ from missions.cli.bodies.world import equipped, firmware_of, world_of
 from missions.cli.declared_options import chosen_names, specified
 from missions.cli.exit_codes import FAILED
 from missions.cli.options import in_options, report
+from missions.errors import PlanError
 from missions.process.ending import EndRequests
+from missions.view.feed import SceneFeed
+from missions.view.opening import open_viewer
+from missions.view.target import parse_view
+from missions.view.viewer import Viewer, ViewError
 
 _LOG_RATE_HZ = 4
 
@@ -99,11 +104,7 @@ def _recording(simulated: Sitl, path: str, losses: Losses) -> Iterator[None]:
         TlogError: the file exists or can't be made.
     """
     recorder = TlogWriter(path)
-    for spec, listener in zip(
-        simulated.spec.vehicles, simulated.record(recorder, losses.log_ended), strict=True
-    ):
-        if simulator_defaults(spec.autopilot).streams_on_request:
-            listener.send(_request_streams())
+    _listen(simulated, recorder, losses)
     try:
         yield
     finally:
@@ -111,6 +112,60 @@ def _recording(simulated: Sitl, path: str, losses: Losses) -> Iterator[None]:
             recorder.close()
         except TlogError as error:
             losses.log_ended(str(error))
+
+
+def _listen(simulated: Sitl, log: PacketLog, losses: Losses) -> None:
+    """Let a log or a feed receive the messages of all vehicles."""
+    listeners = simulated.record(log, losses.log_ended)
+    for spec, listener in zip(simulated.spec.vehicles, listeners, strict=True):
+        if simulator_defaults(spec.autopilot).streams_on_request:
+            listener.send(_request_streams())
+
+
+class _FedFrames:
+    """Passes the frames of vehicles to a viewer's feed."""
+
+    def __init__(self, feed: SceneFeed) -> None:
+        self._feed = feed
+        self._parser = FrameParser()
+
+    def write(self, time_us: int, packet: bytes) -> None:
+        """Take frames that were sent together."""
+        for frames in Packet.by_sender(self._parser.feed(packet)):
+            self._feed.packet(frames, time_us)
+
+
+def _live_viewer(text: str) -> Viewer:
+    """The viewer that `--view` names.
+
+    Raises:
+        PlanError: it names none, or a file.
+        ViewError: it can't be opened.
+    """
+    target = parse_view(text)
+    if target.path is not None:
+        raise PlanError(
+            f"`view` {text}: SITL has no end to draw; give web, window or foxglove, or a `log` to view"
+        )
+    viewer = open_viewer(target)
+    click.echo(f"view: {viewer.where}", err=True)
+    return viewer
+
+
+@contextlib.contextmanager
+def _shown(simulated: Sitl, view: Viewer | None, losses: Losses) -> Iterator[None]:
+    """Show the vehicles in a viewer until the context ends."""
+    if view is None:
+        yield
+        return
+    feed = SceneFeed(view, "sitl")
+    _listen(simulated, _FedFrames(feed), losses)
+    try:
+        yield
+    finally:
+        feed.close()
+        if feed.failure:
+            report(f"the viewer shows nothing from some time on: {feed.failure}")
 
 
 def sitl(
@@ -128,6 +183,7 @@ def sitl(
     params: str | None,
     strict_params: bool,
     log: str | None,
+    view: str | None,
     firmware_logs: Path | None,
     no_wait: bool,
     world: Path | None,
@@ -140,6 +196,9 @@ def sitl(
     with EndRequests() as ending, contextlib.ExitStack() as at_end:
         try:
             options = specified(ServedWorldOptions)
+            viewer = None if view is None else _live_viewer(view)
+            if viewer is not None:
+                at_end.callback(viewer.close)
             ports = _ports(links, gcs_links)
             signing = vehicle_signing(
                 signing_key, options.unsigned, signing_store, on_failure=losses.keys_not_stored
@@ -188,6 +247,9 @@ def sitl(
             ending.remember()
             if log is not None:  # created last, when no other check can still fail
                 at_end.enter_context(_recording(simulated, log, losses))
+            at_end.enter_context(_shown(simulated, viewer, losses))
+        except ViewError as error:
+            raise click.ClickException(in_options(error)) from error
         except (ValueError, OSError, BridgeError) as error:
             raise click.UsageError(in_options(error)) from error
         for vehicle, port, address in opened:
