@@ -31,12 +31,14 @@ class SimulatorDefaults:
     Attributes:
         ports: the links of vehicle `index` (0, 1, ...), where its clients look for it.
         fix_timelines: how a GPS receiver of a kind ("standalone", "differential") starts.
+        system_id_of_instance: the system id follows the instance.
         waits_for_client: the simulation starts when a client is on the first link.
         streams_on_request: a link carries only the streams that were requested on it.
     """
 
     ports: Callable[[int], tuple[Port, ...]]
     fix_timelines: Mapping[str, tuple[GpsFixStage, ...]]
+    system_id_of_instance: bool
     waits_for_client: bool
     streams_on_request: bool
 
@@ -58,12 +60,14 @@ _SIMULATORS: Final[Mapping[str, SimulatorDefaults]] = MappingProxyType(
         "px4": SimulatorDefaults(
             ports=_px4_ports,
             fix_timelines={"standalone": FIX_AT_BOOT, "differential": FIX_AT_BOOT},
+            system_id_of_instance=True,
             waits_for_client=False,
             streams_on_request=False,
         ),
         "ardupilot": SimulatorDefaults(
             ports=_ardupilot_ports,
             fix_timelines={"standalone": FIX_AFTER_10_S, "differential": RTK_FIX_AFTER_10_S},
+            system_id_of_instance=False,
             waits_for_client=True,
             streams_on_request=True,
         ),

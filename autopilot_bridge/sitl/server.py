@@ -85,13 +85,14 @@ class SitlServer:
         sitl.poll_every(min(poll_us, _FREE_RUN_POLL_US))
 
     def open(
-        self, ports: Sequence[Sequence[Port]] | None = None, *, shared: Sequence[Port] = ()
+        self, ports: Sequence[Sequence[Port]] | None = None, *, shared: Sequence[Port] = (), instance: int = 0
     ) -> list[tuple[SitlVehicle, Port, str]]:
         """Open the links of every vehicle.
 
         Args:
             ports: links per vehicle; None: the default ports of each flavour's clients.
             shared: links that all vehicles share.
+            instance: instance of the first vehicle, which the default ports follow.
 
         Returns:
             (vehicle, port, address as opened) of every link.
@@ -103,9 +104,8 @@ class SitlServer:
         with contextlib.ExitStack() as undo:
             undo.callback(self.sitl.close)
             for index, vehicle in enumerate(self.sitl.vehicles):
-                chosen = (
-                    default_ports(vehicle.specification.autopilot, index) if ports is None else ports[index]
-                )
+                flavour = vehicle.specification.autopilot
+                chosen = default_ports(flavour, instance + index) if ports is None else ports[index]
                 for port in chosen:
                     link = self._open(port)
                     vehicle.open(

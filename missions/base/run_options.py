@@ -11,6 +11,7 @@ from missions.errors import PlanError
 SLOWEST: Final = 0.001
 """Smallest simulated time per wall time."""
 _FASTEST: Final = 1e6
+_LAST_INSTANCE: Final = 200
 
 
 class FailureAction(StrEnum):
@@ -94,6 +95,7 @@ class ServedWorldOptions(WorldOptions):
 
     Attributes:
         count: number of vehicles; None: as many as models, or as a file has.
+        instance: instance of the first vehicle, as the firmware's own SITL counts them.
         speedup: simulated time per wall time; 0: as fast as possible.
         duration_s: vehicle time after which it stops; None: never.
         unsigned: links on which unsigned frames are accepted while there is a key.
@@ -104,6 +106,13 @@ class ServedWorldOptions(WorldOptions):
     wind: str | None = other_default(None, varies="0")
     turbulence: Literal["none", "light", "moderate", "severe"] | None = other_default(None, varies="none")
     count: int | None = option(None, least=1, most=MAX_VEHICLES, varies="1", help="Number of vehicles.")
+    instance: int = option(
+        0,
+        least=0,
+        most=_LAST_INSTANCE,
+        help="Instance of the first vehicle, by which the firmware's own SITL numbers its ports, and PX4 the "
+        "system ids.",
+    )
     speedup: float = option(
         1.0,
         least=0.0,

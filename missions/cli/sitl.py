@@ -81,6 +81,12 @@ _DECLARED: Final = (*declared_options(ServedWorldOptions), *declared_options(Vid
     metavar="FOLDER",
     help="Folder for the logs of a real firmware (.ulg, .bin) and what it prints.",
 )
+@click.option(
+    "--ready-file",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="FILE",
+    help="File with the lines of the links, made when they are open, and removed at the end.",
+)
 @click.option("--no-wait", is_flag=True, help="ArduPilot: don't wait for a client on the first port.")
 @body_in(_BODIES)
 def sitl() -> None:

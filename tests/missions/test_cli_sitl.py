@@ -7,6 +7,7 @@ from click.testing import CliRunner
 
 from autopilot_bridge.errors import TlogError
 from autopilot_bridge.mavlink import DEFINITIONS
+from autopilot_bridge.sitl import SitlServer
 from autopilot_bridge.tlog import TlogReader, TlogWriter
 from flightsim.foundation.random_streams import RandomStreams
 from flightsim.home import Home
@@ -100,3 +101,36 @@ def test_the_log_has_what_every_vehicle_says(tmp_path, autopilot):
     for system_id in (1, 2):
         assert received[system_id, "ATTITUDE"] >= 15
         assert received[system_id, "HIL_STATE_QUATERNION"] > 250
+
+
+@pytest.mark.parametrize(
+    ("autopilot", "lines"),
+    [
+        (
+            "px4",
+            (
+                "vehicle 8 (px4 iris): udppeer:127.0.0.1:14587,127.0.0.1:14547 onboard",
+                "vehicle 8 (px4 iris): udppeer:127.0.0.1:18577,127.0.0.1:14550 gcs",
+            ),
+        ),
+        (
+            "ardupilot",
+            tuple(f"vehicle 1 (ardupilot iris): tcpin:127.0.0.1:{port} gcs" for port in (5830, 5832, 5833)),
+        ),
+    ],
+)
+def test_an_instance_has_the_firmwares_ports_and_a_ready_file_lists_them(
+    autopilot, lines, tmp_path, monkeypatch
+):
+    """The wait for a client and the steps are left out: the file is there while the server runs."""
+    ready, seen = tmp_path / "up", []
+    monkeypatch.setattr(SitlServer, "run", lambda *_, **__: seen.append(ready.read_text().splitlines()))
+    result = sitl("--autopilot", autopilot, "--instance", "7", "--no-wait", "--ready-file", str(ready))
+    assert result.exit_code == 0, result.output
+    assert seen == [list(lines)]
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_ready_file_that_can_not_be_made_is_refused(tmp_path):
+    result = sitl(*LINK, "--ready-file", str(tmp_path / "no folder" / "up"))
+    assert result.exit_code == 2 and "--ready-file" in result.output and "No such file" in result.output

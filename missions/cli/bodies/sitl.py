@@ -1,7 +1,7 @@
 """What `flightstack sitl` does."""
 
 import contextlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -69,9 +69,10 @@ def _loss_times(autopilot: str, speedup: float) -> dict[str, float]:
 
 
 def _for_clients(
-    spec: WorldSpec, speedup: float, parameters: Mapping[str, float], unix_epoch_us: int
+    spec: WorldSpec, speedup: float, parameters: Mapping[str, float], unix_epoch_us: int, instance: int
 ) -> WorldSpec:
-    """The world with calendar time, timeouts for clients in wall time, and the parameters of a file.
+    """The world with calendar time, timeouts for clients in wall time, the parameters of a file, and the
+    system ids of the instances.
 
     Its magnetic field is made here, so that an unusable map is refused before the vehicles are.
     """
@@ -83,6 +84,8 @@ def _for_clients(
     vehicles = tuple(
         replace(
             vehicle,
+            system_id=vehicle.system_id
+            + (instance if simulator_defaults(vehicle.autopilot).system_id_of_instance else 0),
             parameters={**_loss_times(vehicle.autopilot, speedup), **vehicle.parameters, **parameters},
         )
         for vehicle in spec.vehicles
@@ -168,6 +171,25 @@ def _shown(simulated: Sitl, view: Viewer | None, losses: Losses) -> Iterator[Non
             report(f"the viewer shows nothing from some time on: {feed.failure}")
 
 
+@contextlib.contextmanager
+def _ready(path: Path, lines: Sequence[str]) -> Iterator[None]:
+    """A file with the lines of the links, whole as soon as it is there; it is removed at the end.
+
+    Raises:
+        UsageError: it can't be written.
+    """
+    part = path.with_name(f"{path.name}.part")
+    try:
+        part.write_text("".join(f"{line}\n" for line in lines), encoding="utf-8")
+        part.replace(path)
+    except OSError as error:
+        raise click.UsageError(f"--ready-file {path}: {error.strerror}") from error
+    try:
+        yield
+    finally:
+        path.unlink(missing_ok=True)
+
+
 def sitl(
     links: tuple[str, ...],
     gcs_links: tuple[str, ...],
@@ -186,6 +208,7 @@ def sitl(
     view: str | None,
     firmware_logs: Path | None,
     no_wait: bool,
+    ready_file: Path | None,
     world: Path | None,
     **_declared: Any,
 ) -> int:
@@ -218,6 +241,7 @@ def sitl(
                 options.speedup,
                 parameters,
                 unix_time_us(),
+                options.instance,
             )
             count = len(spec.vehicles)
             memory = VehicleCards(storage, count)
@@ -242,7 +266,7 @@ def sitl(
             if count > 1 and ports:
                 opened = server.open([()] * count, shared=ports)
             else:
-                opened = server.open([ports] if ports else None)
+                opened = server.open([ports] if ports else None, instance=options.instance)
             at_end.callback(simulated.close)
             ending.remember()
             if log is not None:  # created last, when no other check can still fail
@@ -252,17 +276,21 @@ def sitl(
             raise click.ClickException(in_options(error)) from error
         except (ValueError, OSError, BridgeError) as error:
             raise click.UsageError(in_options(error)) from error
+        lines = []
         for vehicle, port, address in opened:
             system_id = vehicle.specification.system_id
             kind = f"{vehicle.specification.autopilot} {vehicle.specification.model}"
             how = signed_how(signing, port.address)
-            click.echo(f"vehicle {system_id} ({kind}): {address} {port.role}{how}")
+            lines.append(f"vehicle {system_id} ({kind}): {address} {port.role}{how}")
+        for line_of_link in lines:
+            click.echo(line_of_link)
         for named in dict.fromkeys(port.address for _, port, _ in opened):
             warn_if_unsigned(named, signing)
         for uri in () if pictured is None else pictured.uris:
             click.echo(f"video: {uri}")
         click.echo("ready, Ctrl-C ends it")
-
+        if ready_file is not None:
+            at_end.enter_context(_ready(ready_file, lines))
         line = StatusLine()
 
         def show(pace: PaceReport) -> None:
