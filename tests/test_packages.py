@@ -13,6 +13,7 @@ import pytest
 from packaging.requirements import Requirement
 
 from flightsim.foundation.packages import OPTIONAL, MissingPackage, missing, required
+from missions.cli import versions
 from missions.cli.exit_codes import FAILED
 from missions.cli.main import command_line, run_command_line
 
@@ -86,6 +87,20 @@ def test_a_command_names_what_it_lacks_in_one_line(
     assert run_command_line(["study"]) == FAILED
     needs = "this needs PyArrow, which is not installed: pip install 'flightstack[tables]'"
     assert capsys.readouterr().err == f"flightstack: {needs}\n"
+
+
+def test_the_version_lists_what_is_there_and_what_is_not(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    present = {module: [module] for module in OPTIONAL if module != "av"}
+    monkeypatch.setattr(versions, "packages_distributions", lambda: present)
+    monkeypatch.setattr(versions, "version", lambda name: "1.2.3")
+    assert run_command_line(["--version"]) == 0
+    assert capsys.readouterr().out == "flightstack, version 1.2.3\n"
+    assert run_command_line(["-v", "--version"]) == run_command_line(["--version", "-v"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert "numba 1.2.3" in lines and "pyarrow 1.2.3" in lines
+    assert lines[-1] == "PyAV: not installed; pip install 'flightstack[video]'"
 
 
 @pytest.mark.slow

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from typing import Any, Final
 
-__all__ = ["OPTIONAL", "MissingPackage", "missing", "required"]
+__all__ = ["OPTIONAL", "MissingPackage", "how_to_install", "installed", "missing", "required"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,8 +53,12 @@ def missing(module: str | None, needed_by: str = "this") -> str:
     package = OPTIONAL.get((module or "").partition(".")[0])
     if package is None:
         return ""
-    how = f"pip install 'flightstack[{package.extra}]'" if package.extra else ""
-    return f"{needed_by} needs {package.name}, which is not installed: {how}{package.more}"
+    return f"{needed_by} needs {package.name}, which is not installed: {how_to_install(package)}"
+
+
+def how_to_install(package: _Package) -> str:
+    """What brings a package, or why nothing does."""
+    return (f"pip install 'flightstack[{package.extra}]'" if package.extra else "") + package.more
 
 
 def installed(module: str) -> bool:

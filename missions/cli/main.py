@@ -36,6 +36,7 @@ _COMMANDS: Final = {
 }
 
 YOUNG_OBJECTS: Final = 50_000  # imports make as many that stay: looked through once, and not 250 times
+_VERBOSE: Final = "flightstack.verbose"
 _NOT_WRITTEN: Final = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF)
 
 
@@ -72,8 +73,28 @@ class _Commands(click.Group):
             formatter.write_dl([(name, text) for name, (_, _, text) in _COMMANDS.items()])
 
 
+def _print_version(context: click.Context, _: click.Parameter, asked: bool) -> None:
+    if not asked or context.resilient_parsing:
+        return
+    from missions.cli.versions import installation, program_version  # looks through all packages
+
+    click.echo("\n".join(installation()) if context.meta.get(_VERBOSE) else program_version())
+    context.exit()
+
+
 @click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"]})
-@click.version_option(package_name="flightstack")
+@click.option(
+    "-v",
+    "--verbose",
+    is_flag=True,
+    is_eager=True,  # known when --version is processed, in any order
+    expose_value=False,
+    callback=lambda context, _, asked: context.meta.update({_VERBOSE: asked}),
+    help="List of the packages, with --version.",
+)
+@click.option(
+    "--version", is_flag=True, expose_value=False, callback=_print_version, help="Version, and exit."
+)
 def command_line() -> None:
     """MAVLink software-in-the-loop flights: missions, SITL, logs.
 
