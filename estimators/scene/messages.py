@@ -5,6 +5,7 @@ log.
 import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -41,7 +42,8 @@ ORIGIN: Final = "origin"
 """Path of the scene's origin."""
 
 PERIOD_US: Final = 100_000
-"""Of the samples that are shown of messages that come often."""
+"""Of the samples of positions, attitudes and truth that are shown."""
+_SLOW_PERIOD_US: Final = 500_000
 _MOST_STEP_US: Final = 500_000  # of the truth that errors are taken from
 _WITHOUT_HOME_US: Final = 10_000_000
 _FIX_3D: Final = 3
@@ -100,19 +102,20 @@ class MessageScene:
 
     Attributes:
         NAMES: names of the messages that it uses.
-        SAMPLED: those of which it uses the first in each tenth of a second.
+        SAMPLED: those of which it uses the first in each period, with the period, us.
         timeline: converts vehicle times to the timeline of the run.
         origin: of the positions; None: not known yet.
     """
 
-    SAMPLED: Final = frozenset(
+    SAMPLED: Final[Mapping[str, int]] = MappingProxyType(
         {
-            *("ATTITUDE", "ATTITUDE_QUATERNION", "GLOBAL_POSITION_INT", "VFR_HUD", "ESTIMATOR_STATUS"),
-            *("SYS_STATUS", "POSITION_TARGET_GLOBAL_INT"),
-            *("HIL_STATE_QUATERNION", "SIM_STATE", "SIMSTATE"),
+            **dict.fromkeys(("ATTITUDE", "GLOBAL_POSITION_INT"), PERIOD_US),
+            **dict.fromkeys(("HIL_STATE_QUATERNION", "SIM_STATE", "SIMSTATE"), PERIOD_US),
+            **dict.fromkeys(("ATTITUDE_QUATERNION", "VFR_HUD", "ESTIMATOR_STATUS"), _SLOW_PERIOD_US),
+            **dict.fromkeys(("SYS_STATUS", "POSITION_TARGET_GLOBAL_INT"), _SLOW_PERIOD_US),
         }
     )
-    NAMES: Final = SAMPLED | {
+    NAMES: Final = SAMPLED.keys() | {
         *("HEARTBEAT", "STATUSTEXT", "SYSTEM_TIME", "HOME_POSITION", "GPS_RAW_INT"),
         *("MISSION_COUNT", "MISSION_ITEM_INT"),
     }
@@ -206,8 +209,9 @@ class MessageScene:
         self._entries.append(Entry(f"vehicles/{message.src_system}/{name}", time_us, item))
 
     def _is_due(self, time_us: int, message: Message) -> bool:
-        """Whether a sample is shown: the first of this message and sender in each tenth of a second."""
-        key, slot = (message.name, message.src_system, message.src_component), time_us // PERIOD_US
+        """Whether a sample is shown: the first of this message and sender in each period."""
+        name = message.name
+        key, slot = (name, message.src_system, message.src_component), time_us // self.SAMPLED[name]
         if self._slots.get(key) == slot:
             return False
         self._slots[key] = slot

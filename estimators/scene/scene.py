@@ -8,7 +8,7 @@ import numpy as np
 
 from estimators.logs.iterate import Selection, messages_in_order
 from estimators.observations import Image, observations_beside, read_observations
-from estimators.scene.messages import ORIGIN, PERIOD_US, MessageScene
+from estimators.scene.messages import ORIGIN, MessageScene
 from estimators.scene.placing import Assembly
 from estimators.scene.recording import read_scene, scene_beside
 from estimators.scene.shown import Shown
@@ -103,8 +103,9 @@ def _thinned(log: "Log", selections: Sequence[Selection]) -> list[Selection]:
     """The rows that the scene uses of messages that come often, chosen before they are decoded."""
     found = []
     for stream, rows in selections:
-        if stream.name in MessageScene.SAMPLED:
-            slots = log.source.time_us[stream.order[rows]] // PERIOD_US
+        period_us = MessageScene.SAMPLED.get(stream.name)
+        if period_us is not None:
+            slots = log.source.time_us[stream.order[rows]] // period_us
             rows = rows[np.append(True, slots[1:] != slots[:-1])]
         found.append((stream, rows))
     return found
