@@ -2,12 +2,14 @@
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any, Final, Protocol
+from typing import TYPE_CHECKING, Any, Final, Protocol
 
-from estimators.scene_items import Line
 from flightsim.foundation.geodetic_position import NorthEast
 from flightsim.foundation.options import Shown
 from missions.errors import PlanError
+
+if TYPE_CHECKING:
+    from estimators.scene_items import Line
 
 EDGES: Final = Shown(
     fields=("south_m", "west_m", "north_m", "east_m"),
@@ -59,8 +61,10 @@ class Area:
         return cls(south_m=edges.south_m, west_m=edges.west_m, north_m=edges.north_m, east_m=edges.east_m)
 
     @property
-    def shown(self) -> Line:
+    def shown(self) -> "Line":
         """The area for viewers."""
+        from estimators.scene_items import Line  # imports NumPy, which help texts do without
+
         return Line.rectangle(
             south_m=self.south_m,
             west_m=self.west_m,
