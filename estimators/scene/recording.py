@@ -3,10 +3,13 @@
 The messages are in the log; with both, a recorded run gives the scene that was live.
 """
 
-from collections.abc import Iterator
-from dataclasses import replace
+from collections.abc import Iterator, Mapping
+from dataclasses import fields, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Final, get_args
+
+import numpy as np
 
 from estimators.dataclass_records import RecordWriter, read_records
 from estimators.scene.shown import Estimates, Shown, Subject
@@ -72,9 +75,44 @@ def read_scene(path: Path) -> Iterator[Shown]:
                 lat_deg, lon_deg, alt_m = map(float, place)
                 origin = GeodeticPosition(lat_deg=lat_deg, lon_deg=lon_deg, alt_m=alt_m)
             item = replace(item, role=Role(item.role)) if hasattr(item, "role") else item
+            if not _is_sound(item):
+                return
             relative_to = header.get("relative_to")
             found = item if relative_to is None else Relative(item=item, system_id=int(relative_to))
             shown = Shown(subject, str(header["name"]), int(header["time_us"]), origin, found)
         except (ValueError, TypeError, LookupError):
             return
         yield shown
+
+
+_SHAPES: Final[Mapping[str, tuple[tuple[int | None, ...], ...]]] = MappingProxyType(
+    {
+        "points_ned_m": ((None, 3),),
+        "weights": ((None,),),
+        "covariance_m2": ((2, 2), (3, 3)),
+        "marks_px": ((None, 2),),
+        "pixels": ((None, None), (None, None, 3)),
+        "values": ((None, None),),
+        "pos_ned_m": ((3,),),
+        "mean_ned_m": ((3,),),
+        "q_ned_from_camera": ((4,),),
+    }
+)
+"""Shapes of the fields of items, by name; None: any length."""
+
+
+def _is_sound(item: Any) -> bool:
+    """Whether arrays and vectors of an item are numbers in the shapes that they have."""
+    for field in fields(item):
+        shapes = _SHAPES.get(field.name)
+        if shapes is None:
+            continue
+        value = np.asarray(getattr(item, field.name))
+        fits = any(
+            len(shape) == value.ndim
+            and all(own in (None, length) for own, length in zip(shape, value.shape, strict=True))
+            for shape in shapes
+        )
+        if not fits or value.dtype.kind not in "fiu":
+            return False
+    return True

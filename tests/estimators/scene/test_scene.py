@@ -259,3 +259,21 @@ def test_estimates_are_shown_by_the_names_of_their_columns():
     error = items["error_roll"]
     assert isinstance(error, Value) and error.unit == "deg"
     assert (error.value, error.sigma) == pytest.approx((math.degrees(0.05), math.degrees(0.02)))
+
+
+@pytest.mark.parametrize(
+    "item",
+    [
+        Field(values=np.ones(4), south_m=0.0, west_m=0.0, cell_m=1.0, unit=""),
+        Line(points_ned_m=np.ones((2, 2))),
+        Pose(pos_ned_m=(1.0, 2.0)),
+        Pose(pos_ned_m=("a", "b", "c")),
+        PointSet(points_ned_m=np.array([[b"a", b"b", b"c"]])),
+    ],
+)
+def test_an_item_of_another_shape_ends_the_file(tmp_path, item):
+    writer = SceneWriter(tmp_path / "flight.scene")
+    for one in (Text(text="before"), item, Text(text="after")):
+        writer.write(Shown(Subject(base="mission"), "x", 1, None, one))
+    writer.close()
+    assert [shown.item for shown in read_scene(tmp_path / "flight.scene")] == [Text(text="before")]
