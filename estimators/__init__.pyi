@@ -20,5 +20,6 @@ from estimators.logs.report import report_of as report_of
 from estimators.logs.table import Table as Table
 from estimators.magnetic_identification.parameters import IdentificationParameters as IdentificationParameters
 from estimators.multi_target.parameters import MultiTargetParameters as MultiTargetParameters
+from estimators.reports.figure import vector_figures as vector_figures
 from estimators.survey.parameters import ProcessingParameters as ProcessingParameters
 from estimators.vision_search.parameters import VisionSearchParameters as VisionSearchParameters

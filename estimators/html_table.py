@@ -8,7 +8,8 @@ from typing import Final
 __all__ = ["html_page", "html_picture", "html_table"]
 
 _STYLE: Final = """
-body { font: 14px/1.45 system-ui, sans-serif; color: #1f2937; max-width: 1100px; margin: 24px auto }
+body { font: 14px/1.45 system-ui, sans-serif; color: #1f2937 }
+body { max-width: 1100px; margin: 24px auto; padding: 0 16px }
 h1 { font-size: 22px; margin-bottom: 4px } h2 { font-size: 17px; margin: 28px 0 6px }
 table { border-collapse: collapse } th, td { text-align: left; padding: 2px 12px 2px 0; vertical-align: top }
 th { font-weight: 600 } tr { border-bottom: 1px solid #e5e7eb } img { max-width: 100% }

@@ -1,13 +1,16 @@
 """Figures for the files of a run. matplotlib is imported when the first is made: most runs need none."""
 
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["INK", "blank_figure", "label_of", "save_figure", "tidy"]
+__all__ = ["INK", "blank_figure", "label_of", "save_figure", "tidy", "vector_figures"]
 
 INK: Final = "#1f2937"
 """Colour of texts."""
@@ -28,14 +31,35 @@ def blank_figure(width_in: float, height_in: float, *, dpi: int = 120) -> "Figur
     return figure
 
 
+_DATES: Final = {"svg": "Date", "pdf": "CreationDate"}
+_vector_formats: ContextVar[tuple[str, ...]] = ContextVar("vector_formats", default=())
+
+
+@contextmanager
+def vector_figures(*, wanted: bool = True) -> Iterator[None]:
+    """Context in which figures are written as SVG and PDF beside each PNG, for papers.
+
+    Args:
+        wanted: False: nothing changes.
+    """
+    token = _vector_formats.set(tuple(_DATES) if wanted else ())
+    try:
+        yield
+    finally:
+        _vector_formats.reset(token)
+
+
 def save_figure(figure: "Figure", path: Path) -> None:
-    """Write a figure as PNG, which is the same for the same figure.
+    """Write a figure as PNG, which is the same for the same figure; also as `vector_figures` says.
 
     Raises:
-        FileExistsError: the file exists.
+        FileExistsError: a file exists.
     """
     with path.open("xb") as file:
         figure.savefig(file, format="png", metadata={"Software": None})
+    for form in _vector_formats.get():
+        with path.with_suffix(f".{form}").open("xb") as file:
+            figure.savefig(file, format=form, metadata={_DATES[form]: None})
 
 
 _UNITS: Final = {

@@ -85,6 +85,7 @@ options)`. The run folder gets flight.tlog, summary.json and track.png.
     help="File for the mission that would be uploaded (.plan, .waypoints), in place of a flight.",
 )
 @view_option(_results)
+@_results("--vector", is_flag=True, help="Pictures also as SVG and PDF.")
 @_results("--no-picture", is_flag=True, help="No picture track.png, and no page.")
 @_results(
     "--no-report",

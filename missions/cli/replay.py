@@ -32,6 +32,7 @@ _BODIES: Final = "missions.cli.bodies.replay"
     help="Run folder, or folder of theirs. [default: runs/ESTIMATOR-N]",
 )
 @view_option()
+@click.option("--vector", is_flag=True, help="Pictures also as SVG and PDF.")
 @click.option("--no-picture", is_flag=True, help="No picture errors.png.")
 @body_in(_BODIES)
 def replay() -> None:

@@ -67,6 +67,7 @@ def engine_options() -> list[click.Parameter]:
             help="Folder, also s3://, gs:// and others of pyarrow.fs. [default: runs/STUDY-N]",
         ),
         click.Option(["--resume"], metavar="DIR|URI", help="Continue the study in this folder."),
+        click.Option(["--vector"], is_flag=True, help="Pictures also as SVG and PDF."),
         click.Option(["--no-picture"], is_flag=True, help="No pictures."),
     ]  # fmt: skip
 

@@ -7,7 +7,7 @@ import pytest
 
 from estimators.comparison import Comparison
 from estimators.reports import picture
-from estimators.reports.figure import label_of
+from estimators.reports.figure import blank_figure, label_of, save_figure, vector_figures
 
 
 @pytest.mark.parametrize(
@@ -47,3 +47,15 @@ def test_all_panels_of_errors_share_their_time_axis(monkeypatch: pytest.MonkeyPa
     assert len({panel.get_xlim() for panel in axes}) == 1
     labels = [panel.get_ylabel() for panel in axes]
     assert labels == ["roll, deg", "error, deg", "gyro bias x, rad/s", "airspeed, m/s"]
+
+
+def test_vector_figures_stand_beside_the_picture(tmp_path: Path) -> None:
+    figure = blank_figure(1.0, 1.0)
+    with vector_figures():
+        save_figure(figure, tmp_path / "track.png")
+    save_figure(figure, tmp_path / "errors.png")
+    assert sorted(file.name for file in tmp_path.iterdir()) == [
+        *("errors.png", "track.pdf", "track.png", "track.svg")
+    ]
+    assert (tmp_path / "track.pdf").read_bytes().startswith(b"%PDF")
+    assert b"<svg" in (tmp_path / "track.svg").read_bytes()

@@ -10,6 +10,7 @@ import click
 from autopilot_bridge.errors import AddressError, BridgeError
 from autopilot_bridge.mavlink.components import GROUND_STATION
 from autopilot_bridge.parameter_files import left_out
+from estimators.reports.figure import vector_figures
 from flightsim.world_spec import WorldSpec
 from missions.base.given_text import parameters_from_file
 from missions.base.mission import Mission
@@ -175,7 +176,7 @@ def _fly_viewed(
         )
         if given["export_plan"] is not None:
             return _export(mission, request, given["export_plan"])
-        with line.running():
+        with line.running(), vector_figures(wanted=given["vector"]):
             result = fly_mission(mission, request, line)
     except (AddressError, BridgeError) as error:
         raise click.UsageError(in_options(error)) from error

@@ -8,6 +8,7 @@ import click
 from estimators.errors import EstimatorError
 from estimators.logs import LogError
 from estimators.reports import notes_of, table_lines, warnings_of
+from estimators.reports.figure import vector_figures
 from missions.cli.bodies.viewing import viewing
 from missions.cli.declared_options import specified
 from missions.cli.exit_codes import FAILED
@@ -42,7 +43,7 @@ def replay(**given: Any) -> int:
             raise PlanError(
                 f"`view` {given['view']} is one file for several logs; give web, or replay one log"
             )
-        with viewing(given["view"]) as view:
+        with viewing(given["view"]) as view, vector_figures(wanted=given["vector"]):
             return _replayed(given, view, on_done)
     except (EstimatorError, LogError, PlanError) as error:
         raise click.UsageError(in_options(error, own=True)) from error

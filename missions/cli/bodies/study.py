@@ -16,6 +16,7 @@ from typing import Any, Final
 
 import click
 
+from estimators.reports.figure import vector_figures
 from missions.cli.bodies.status_line import PipeLines, StatusLine
 from missions.cli.bodies.world import firmware_of
 from missions.cli.declared_options import Given, made_of_values
@@ -171,7 +172,7 @@ def _run_and_tell(
             raise EndedBySignal(number)
 
     line = _ProgressLine()
-    with line.running(study.name), Ending():
+    with line.running(study.name), Ending(), vector_figures(wanted=given["vector"]):
         result = run_study(
             study,
             runs=how.runs,
