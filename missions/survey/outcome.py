@@ -63,7 +63,7 @@ class SurveyFindings:
         if self.survey is None:
             return ""
         missed = [
-            f"{line.name} ({100.0 * share:.0f} %)"
+            f"{line.name} ({math.floor(1e3 * share) / 10.0:g} %)"
             for line, share in zip(self.survey.plan.lines, self.coverage, strict=True)
             if share < LEAST_COVERAGE
         ]
