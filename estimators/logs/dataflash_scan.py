@@ -183,7 +183,8 @@ def _lookup(table: Mapping[str, Array], value: str) -> dict[int, Any]:
     """The values of UNIT or MULT by their ids."""
     if not {"Id", value} <= table.keys() or table["Id"].dtype.kind not in "iu":
         return {}
-    return dict(zip((table["Id"] & 0xFF).tolist(), table[value].tolist(), strict=True))
+    ids = table["Id"].astype(np.int64) & 0xFF  # letters, of which a log has signed bytes
+    return dict(zip(ids.tolist(), table[value].tolist(), strict=True))
 
 
 def _units(

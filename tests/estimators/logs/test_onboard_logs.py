@@ -12,6 +12,7 @@ from pyulog.core import ULog
 
 from estimators.logs import LogError, open_log, report_of
 from estimators.logs.condition import Condition
+from estimators.logs.dataflash_scan import _lookup
 from tests.estimators.logs.onboard_logs import (
     SECONDS,
     DataflashWriter,
@@ -392,3 +393,9 @@ def test_a_damaged_time_of_a_topic_is_left_out(tmp_path):
     log = open_log(writer.save(tmp_path / "a.ulg"))
     assert log.duration_s < 4.0 and len(log.table("HEARTBEAT")) < 20
     assert report_of(log).drops["implausible_times"] == 1
+
+
+def test_units_of_a_log_have_signed_bytes_as_ids():
+    """As ArduPilot's own logs have them (format b)."""
+    table = {"Id": np.array([109, -1], dtype=np.int8), "Label": np.array([b"m", b"?"])}
+    assert _lookup(table, "Label") == {109: b"m", 255: b"?"}
