@@ -76,7 +76,7 @@ def test_all_lines_are_measured_and_the_target_is_listed(flown):
 def test_the_folder_holds_what_a_survey_delivers(flown):
     names = {path.name for path in flown.folder.iterdir()}
     assert names == {
-        *("flight.tlog", "summary.json", "track.png", MAP_NAME),
+        *("flight.scene", "flight.tlog", "summary.json", "track.png", MAP_NAME),
         *(ANOMALIES, LINE_DATA, LINE_DATA_XYZ, LINES, MAP),
     }
     assert (flown.folder / "track.png").stat().st_size > 50_000
