@@ -17,6 +17,8 @@ from missions.cli.main import run_command_line
 from missions.runs.report_page import add_page
 from tests.estimators.logs import track_log
 
+pytest.importorskip("bokeh", reason="Bokeh is not installed: pip install 'flightstack[report]'")
+
 SUMMARY = {
     "mission": "sector", "vehicle": "iris", "autopilot": "px4", "outcome": "failed", "reason": "a <b> reason",
     "seed": 3, "distance_m": 440.0, "options": {"altitude_m": 30.0}, "command": "flightstack fly sector",

@@ -322,7 +322,7 @@ def test_a_folder_is_one_run_s_from_its_beginning(scripted, tmp_path, monkeypatc
     result = session.fly("lissajous", replace(request, on_open=fly_another))
     assert refused
     assert result.outcome == "completed", result.reason
-    assert {path.name for path in tmp_path.iterdir()} == {"flight.tlog", "summary.json"}
+    assert {path.name for path in tmp_path.iterdir()} == {"flight.scene", "flight.tlog", "summary.json"}
 
 
 class FillingDisk(TlogWriter):
@@ -367,7 +367,7 @@ def test_a_summary_that_finds_no_room_is_reported(scripted, tmp_path, monkeypatc
 
 
 def test_a_picture_that_finds_no_room_is_reported_in_the_summary_too(scripted, tmp_path, monkeypatch):
-    def full(path, _title, _flights):
+    def full(path, _title, _flights, _overlay):
         path.write_bytes(b"half")
         raise OSError(errno.ENOSPC, "No space left on device")
 
@@ -378,7 +378,8 @@ def test_a_picture_that_finds_no_room_is_reported_in_the_summary_too(scripted, t
     summary = json.loads((tmp_path / "run" / "summary.json").read_text())
     assert (summary["outcome"], summary["reason"]) == (result.outcome, result.reason)
     assert summary == result.summary
-    assert {path.name for path in (tmp_path / "run").iterdir()} == {"flight.tlog", "summary.json"}
+    names = {path.name for path in (tmp_path / "run").iterdir()}
+    assert names == {"flight.scene", "flight.tlog", "summary.json"}
 
 
 # command line

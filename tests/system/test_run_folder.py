@@ -44,7 +44,8 @@ def test_summary(run: Run) -> None:
     assert set(summary) >= SUMMARY_KEYS
     assert summary["outcome"] == "completed" and summary["seed"] == 3
     assert (run.folder / "track.png").read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
-    assert sorted(path.name for path in run.folder.iterdir()) == ["flight.tlog", "summary.json", "track.png"]
+    names = {path.name for path in run.folder.iterdir()}
+    assert names == {"flight.scene", "flight.tlog", "summary.json", "track.png"}
 
 
 def test_log_has_both_directions_and_the_truth(run: Run) -> None:

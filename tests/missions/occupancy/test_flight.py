@@ -79,7 +79,7 @@ def test_the_target_is_found_and_all_are_down_again(found):
 
 def test_the_folder_holds_map_summary_log_and_picture(found):
     names = {path.name for path in found.folder.iterdir()}
-    assert names == {MAP_NAME, "summary.json", "flight.tlog", "track.png"}
+    assert names == {MAP_NAME, "summary.json", "flight.scene", "flight.tlog", "track.png"}
     assert json.loads((found.folder / "summary.json").read_text())["target_found"] is True
     assert (found.folder / "track.png").stat().st_size > 20_000
 

@@ -51,7 +51,8 @@ def test_a_plan_is_flown_with_its_fence_rally_points_and_jumps(flavour: str, tmp
     assert result.summary["path_max_error_m"] < 2.0
     assert result.summary["vehicles"][0]["waypoints"]["passed"] == 8
     assert result.summary["vehicles"][0]["home"]["lat_deg"] == pytest.approx(LAT, abs=1e-4)
-    assert {p.name for p in result.folder.iterdir()} == {"flight.tlog", "summary.json", "track.png"}
+    names = {path.name for path in result.folder.iterdir()}
+    assert names == {"flight.scene", "flight.tlog", "summary.json", "track.png"}
 
 
 @both

@@ -168,6 +168,7 @@ def view(capsys):
 
 
 def test_what_can_not_be_viewed_is_one_line(view, log, tmp_path, monkeypatch):
+    pytest.importorskip("rerun", reason="Rerun is not installed: pip install 'flightstack[view]'")
     assert view(log, "--view", "orbit")[0] == 2
     (tmp_path / "empty").mkdir()
     assert view(tmp_path / "empty", "--view", "web")[0] == 2
