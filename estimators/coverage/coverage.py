@@ -1,6 +1,7 @@
 """Swept area and cumulative probability of detection of flown tracks on a grid."""
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
@@ -177,7 +178,7 @@ def _length_over(area: Area, parts: Sequence[Array]) -> float:
     return total_m
 
 
-class _Search:
+class _Search(ABC):
     """Tracks with a sensor.
 
     Attributes:
@@ -186,13 +187,13 @@ class _Search:
 
     parts: list[Array]
 
+    @abstractmethod
     def seen_corners(self) -> Array:
         """A rectangle around all that was seen."""
-        raise NotImplementedError
 
+    @abstractmethod
     def over(self, layout: GridLayout) -> tuple[Array, NDArray[np.bool_]]:
         """Probability of detection of each cell, and whether it was seen."""
-        raise NotImplementedError
 
 
 def _in_flight(

@@ -81,7 +81,7 @@ def _wait(child: int, mask: Iterable[int]) -> int:
             os.kill(child, number)
 
     if sys.platform == "win32":
-        raise NotImplementedError
+        raise AssertionError("there is no supervising parent on Windows")
     before = {number: signal.signal(number, pass_on) for number in END_SIGNALS}
     if sys.stdin is not None and sys.stdin.isatty():
         signal.signal(signal.SIGINT, signal.SIG_IGN)
